@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Other people's traffic on the same pair: named, never decoded as Daly (docs/records.md, section 4).
+
+    Modbus RTU    frames end to end, any address but Daly's, right CRC, a length that the function allows
+    Sinowealth    request | 0A | register 01..16 | length 02, 04 |    reply | length bytes | crc-8 |
+
+Sinowealth boards: field notes, section b. The CRC-8 (polynomial 07, start 00) runs over request and reply together.
+"""
+
+from __future__ import annotations
+
+from dalyref import modbus
+
+MODBUS, SINOWEALTH = "Modbus RTU", "Sinowealth"
+LONGEST = 4096
+"""A run of more bytes is not named."""
+
+_MAYBE, _DEAD = -1, -2
+
+
+def crc8(data: bytes) -> int:
+    """Return the CRC-8 with polynomial 07 and start 00."""
+    value = 0
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = (value << 1 ^ 0x07 if value & 0x80 else value << 1) & 0xFF
+    return value
+
+
+def _modbus_lengths(data: bytes, at: int, end: int) -> list[int]:
+    """Return the lengths the function at `at` allows, shortest first; one not yet known is the least it can be."""
+    function = data[at + 1]
+    if 0x01 <= function <= 0x04:
+        count = data[at + 2] if end - at > 2 else 1
+        return sorted((8, 5 + count)) if 1 <= count <= 250 else [8]
+    if function in (0x05, 0x06):
+        return [8]
+    if function in (0x0F, 0x10):
+        count = data[at + 6] if end - at > 6 else 1
+        return [8, 9 + count] if 1 <= count <= 250 else [8]
+    if 0x81 <= function <= 0x86 or function in (0x8F, 0x90):
+        return [5]
+    return []
+
+
+def _modbus_step(data: bytes, at: int, end: int) -> int:
+    """Return where the frame at `at` ends, _MAYBE where bytes are missing, _DEAD where there is none."""
+    if modbus.asks(data[at]) or modbus.answers(data[at]):
+        return _DEAD
+    if end - at < 2:
+        return _MAYBE
+    verdict = _DEAD
+    for length in _modbus_lengths(data, at, end):
+        if at + length > end:
+            verdict = _MAYBE
+        elif modbus.crc(data[at : at + length]) == 0:
+            return at + length
+    return verdict
+
+
+def _asks(data: bytes, at: int, end: int) -> bool:
+    """Tell whether the bytes at `at` fit a Sinowealth request as far as they go."""
+    there = end - at
+    return (
+        (there < 1 or data[at] == 0x0A)
+        and (there < 2 or 0x01 <= data[at + 1] <= 0x16)
+        and (there < 3 or data[at + 2] in (2, 4))
+    )
+
+
+def _sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
+    """Return where the exchange at `at` ends; a request alone is one when another, or the end, follows it."""
+    if not _asks(data, at, end):
+        return _DEAD
+    behind = at + 3
+    if end < behind:
+        return _MAYBE
+    stop = behind + data[at + 2] + 1
+    if stop > end and not ended:
+        return _MAYBE
+    if stop <= end and crc8(data[at : stop - 1]) == data[stop - 1]:
+        return stop
+    follows = end - behind >= 3 and _asks(data, behind, end)
+    return behind if follows or (ended and behind == end) else _DEAD
+
+
+class Run:
+    """Judges one run of bytes that may still grow. What was read once is not read again."""
+
+    __slots__ = ("_modbus", "_sinowealth")
+
+    def __init__(self) -> None:
+        self._modbus = 0  # how far, from the run's beginning, it is other people's; _DEAD: it is not
+        self._sinowealth = 0
+
+    def judge(self, data: bytes, start: int, end: int, *, ended: bool) -> str | None:
+        """Name the run ``data[start:end]``; "" where it is nothing known, None where more bytes must tell.
+
+        `ended` says that the run ends at `end`: then the answer is never None.
+        """
+        if end - start > LONGEST:
+            self._modbus = self._sinowealth = _DEAD
+        self._modbus = done = self._walk(data, start, end, self._modbus, ended=ended, sinowealth=False)
+        if ended and done == end - start:
+            return MODBUS
+        self._sinowealth = done = self._walk(data, start, end, self._sinowealth, ended=ended, sinowealth=True)
+        if ended and done == end - start:
+            return SINOWEALTH
+        return "" if ended or self._modbus == self._sinowealth == _DEAD else None
+
+    @staticmethod
+    def _walk(data: bytes, start: int, end: int, done: int, *, ended: bool, sinowealth: bool) -> int:
+        while 0 <= done < end - start:
+            at = start + done
+            step = _sinowealth_step(data, at, end, ended=ended) if sinowealth else _modbus_step(data, at, end)
+            if step == _MAYBE:
+                return _DEAD if ended else done
+            done = step - start if step >= 0 else _DEAD
+        return done
