@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Classic pcap, written and read (draft-ietf-opsawg-pcap), for tools that know nothing newer.
+
+File header, 24 bytes, then records, all in the byte order that the magic shows::
+
+    0        4        6        8          12          16           20          24
+    | magic  | major  | minor  | reserved | reserved  | snap length| link type |      magic A1B2C3D4: microseconds
+    | seconds         | fraction          | captured  | original   | data ...         magic A1B23C4D: nanoseconds
+
+It has no place for interfaces, flags, comments or statistics: an event is a packet without bytes.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING, Final
+
+from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.linktype import link_type_name
+from dalycapture.writer import CaptureWriter, counted
+from dalyref.packet import Packet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dalycapture.interface import Interface
+    from dalycapture.output import Output
+    from dalycapture.source import Source
+
+MICROSECONDS: Final = 0xA1B2C3D4
+NANOSECONDS: Final = 0xA1B23C4D
+MAX_PACKET: Final = 16 << 20
+SNAP_LENGTH: Final = 262144
+
+_HEADER = "IHHIIII"
+_RECORD = "IIII"
+
+
+class PcapWriter(CaptureWriter):
+    """Writes classic pcap, little-endian, one packet a write."""
+
+    def __init__(self, output: Output, *, nanoseconds: bool = True) -> None:
+        super().__init__(output)
+        self._magic = NANOSECONDS if nanoseconds else MICROSECONDS
+        self._unit = 1 if nanoseconds else 1000
+        self._link_type: int | None = None
+
+    def add_interface(self, interface: Interface) -> int:
+        """Write the file header, at the first interface; others must be of the same link type."""
+        if self._link_type is None:
+            header = struct.pack("<" + _HEADER, self._magic, 2, 4, 0, 0, SNAP_LENGTH, interface.link_type)
+            self._write(header)
+            self._link_type = interface.link_type
+        elif self._link_type != interface.link_type:
+            message = (
+                f"classic pcap holds one link type, not both {link_type_name(self._link_type)} and "
+                f"{link_type_name(interface.link_type)}; write pcapng"
+            )
+            raise CaptureError(message)
+        return 0
+
+    def _packet(self, time_ns: int, data: bytes, *, interface: int, flags: int, comment: str, dropped: int) -> bytes:
+        del interface, flags, comment, dropped  # no place for them
+        if self._link_type is None:
+            raise ValueError("no interface was described")
+        seconds, rest = divmod(time_ns, 1_000_000_000)
+        return struct.pack("<" + _RECORD, seconds, rest // self._unit, len(data), len(data)) + data
+
+    def write_statistics(self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int) -> None:
+        """Do nothing: the format has no place for them."""
+
+
+def read_pcap(source: Source) -> Iterator[Packet]:
+    """Yield the packets of a classic pcap stream, numbered from 1.
+
+    Raises CaptureError where the file is damaged, TruncatedError where it ends in the middle of a packet; what was
+    whole before that point has been yielded.
+    """
+    number = 0
+
+    def cut_off(what: str) -> TruncatedError:
+        return TruncatedError(
+            f"{source.name}: cut off in the middle of {what} at byte {source.offset}, "
+            f"after {counted(number, 'whole packet')}"
+        )
+
+    head = source.read(24)
+    if len(head) < 24:
+        raise cut_off("its header")
+    order, unit = next(
+        (order, unit)
+        for order in "<>"
+        for magic, unit in ((NANOSECONDS, 1), (MICROSECONDS, 1000))
+        if head[:4] == struct.pack(order + "I", magic)
+    )
+    *_, link_type = struct.unpack(order + _HEADER, head)
+    link_type &= 0xFFFF  # the upper half says how long a frame check sequence is
+    while head := source.read(16):
+        if len(head) < 16:
+            raise cut_off("a packet")
+        seconds, fraction, captured, _ = struct.unpack(order + _RECORD, head)
+        if captured > MAX_PACKET:
+            message = (
+                f"{source.name}: damaged near byte {source.offset}, after {counted(number, 'whole packet')}: "
+                f"a packet of {captured} bytes"
+            )
+            raise CaptureError(message)
+        data = source.read(captured)
+        if len(data) < captured:
+            raise cut_off("a packet")
+        number += 1
+        yield Packet(
+            number=number,
+            time_ns=seconds * 1_000_000_000 + fraction * unit,
+            data=data,
+            link_type=link_type,
+        )

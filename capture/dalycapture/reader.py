@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Read any capture file we know: pcapng or classic pcap, plain or gzip-compressed, from a path or standard input."""
+
+from __future__ import annotations
+
+import gzip
+import sys
+import zlib
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.output import reason
+from dalycapture.pcap import MICROSECONDS, NANOSECONDS, read_pcap
+from dalycapture.pcapng import read_pcapng
+from dalycapture.source import Source
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dalyref.packet import Packet
+
+_PCAPNG = b"\x0a\x0d\x0d\x0a"
+_PCAP = frozenset(magic.to_bytes(4, order) for magic in (MICROSECONDS, NANOSECONDS) for order in ("little", "big"))
+_GZIP = b"\x1f\x8b"
+_OTHERS = (
+    (b"\x28\xb5\x2f\xfd", "is compressed with zstd; unpack it first: zstd -d"),
+    (b"\x04\x22\x4d\x18", "is compressed with lz4; unpack it first: lz4 -d"),
+    (b"\xfd7zXZ", "is compressed with xz; unpack it first: xz -d"),
+    (b"PK\x03\x04", "is a zip archive; unpack it first"),
+    (b"\xa1\xb2\xcd\x34", "is a modified pcap; convert it first: editcap -F pcapng"),
+    (b"\x34\xcd\xb2\xa1", "is a modified pcap; convert it first: editcap -F pcapng"),
+)
+
+
+def read_capture(path: Path | str) -> Iterator[Packet]:
+    """Yield the packets of a capture file, in order, numbered from 1 as Wireshark numbers them.
+
+    path: pcapng or classic pcap, either also gzip-compressed; ``-`` is standard input. Packets of every link type come,
+    with their ``link_type``; DALY_LINK_TYPES (dalycapture.linktype) says which hold our serial bytes. Memory is bounded
+    by one block of at most 16 MiB. Raises CaptureError (one line) when the file is missing, no capture, or damaged, and
+    TruncatedError after the last whole packet when it ends in the middle of one.
+    """
+    name = "standard input" if str(path) == "-" else str(path)
+    with ExitStack() as stack:
+        try:
+            stream = sys.stdin.buffer if str(path) == "-" else stack.enter_context(Path(path).open("rb"))
+            yield from _packets(Source(stream, name))
+        except FileNotFoundError:
+            raise CaptureError(f"{name}: there is no such file") from None
+        except IsADirectoryError:
+            raise CaptureError(f"{name} is a directory; give a capture file in it") from None
+        except PermissionError:
+            raise CaptureError(f"{name}: no permission to read it") from None
+        except OSError as error:
+            raise CaptureError(f"{name}: can not be read: {reason(error)}") from None
+
+
+def _packets(source: Source) -> Iterator[Packet]:
+    if source.peek(2) == _GZIP:
+        try:
+            with gzip.GzipFile(fileobj=source) as unpacked:  # pyright: ignore[reportArgumentType]
+                yield from _plain(Source(unpacked, source.name))
+        except EOFError:
+            raise TruncatedError(f"{source.name}: cut off in the middle of its compressed data") from None
+        except (gzip.BadGzipFile, zlib.error) as error:
+            raise CaptureError(f"{source.name}: its compressed data is damaged: {error}") from None
+    else:
+        yield from _plain(source)
+
+
+def _plain(source: Source) -> Iterator[Packet]:
+    magic = source.peek(4)
+    if magic == _PCAPNG:
+        yield from read_pcapng(source)
+    elif magic in _PCAP:
+        yield from read_pcap(source)
+    elif magic and any(whole.startswith(magic) for whole in (_PCAPNG, *_PCAP)):
+        raise TruncatedError(f"{source.name}: cut off in the middle of its header, after {len(magic)} bytes")
+    else:
+        raise CaptureError(f"{source.name} {_what_else(source.peek(512))}")
+
+
+def _what_else(start: bytes) -> str:
+    if not start:
+        return "is empty; a capture has at least a header"
+    for magic, text in _OTHERS:
+        if start.startswith(magic):
+            return text
+    if not any(byte < 0x20 and byte not in b"\t\n\v\f\r\x1b" for byte in start):
+        return "is a text file, not a capture; give a pcapng or pcap file"
+    return "is not a capture file; give a pcapng or pcap file"

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The sniffer: listen to one port, cut what comes into records, write every record to every sink.
+
+    port --read, time--> framer --records--> sinks (files and pipes), listener
+
+It waits in one ``poll`` for the port, for whoever calls ``stop`` (from a thread or a signal), for pipes whose reader
+catches up or goes away, and, while an incomplete record is held, for the end of 250 ms of quiet.
+
+A file is evidence: when it can not be written, the capture ends with an error. A pipe is a view: when its reader goes
+away, the capture goes on, unless nothing is left to write to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import selectors
+import signal
+import socket
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Final, NoReturn
+
+from dalycapture.errors import CaptureError, PortError
+from dalycapture.framing import SILENCE_NS, Framer, TimedRecord
+from dalycapture.output import PipeOutput
+from dalycapture.pcapng import CRC_ERROR, TOO_SHORT
+from dalycapture.port import READ_SIZE
+from dalyref.kinds import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Sequence
+    from types import FrameType
+
+    from dalycapture.interface import Interface
+    from dalycapture.port import Port
+    from dalycapture.writer import CaptureWriter
+
+ERROR_FLAGS: Final = {Kind.BAD_CHECKSUM: CRC_ERROR, Kind.SHORT: TOO_SHORT}
+
+# PollSelector, not epoll: epoll takes no /dev/null. Windows has select alone.
+_Selector: type[selectors.BaseSelector] = getattr(selectors, "PollSelector", selectors.SelectSelector)
+
+
+class End(StrEnum):
+    """Why a capture ended."""
+
+    STOPPED = "stopped"
+    DURATION = "duration reached"
+    PACKETS = "number of packets reached"
+    FILESIZE = "file size reached"
+    PORT_LOST = "port lost"
+    READER_GONE = "reader of the pipe went away"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """When to stop by oneself; None: never. duration in seconds, filesize in bytes, packets are records."""
+
+    duration: float | None = None
+    packets: int | None = None
+    filesize: int | None = None
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a capture has heard so far."""
+
+    records: int = 0
+    bytes: int = 0
+    kinds: Counter[Kind] = field(default_factory=Counter[Kind])
+    seconds: float = 0.0
+    end: End = End.STOPPED
+    problem: str = ""  # one line, when the port was lost
+    notes: list[str] = field(default_factory=list[str])  # pipes that broke or fell behind
+
+    @property
+    def good(self) -> int:
+        """Frames with right checksum."""
+        return self.kinds[Kind.FRAME]
+
+    @property
+    def bad(self) -> int:
+        """Records that are damaged Daly frames, whole or cut off."""
+        return self.kinds[Kind.BAD_CHECKSUM] + self.kinds[Kind.SHORT]
+
+
+class Sniffer:
+    """One capture of one port. ``run`` works until a limit, ``stop``, or the end of the port.
+
+    port: open, closed by the caller. sinks: open writers, closed here, each with its statistics. listener: called for
+    each record after it was written, in the thread of ``run``. ``tally`` may be read from other threads.
+    """
+
+    def __init__(
+        self,
+        port: Port,
+        interface: Interface,
+        sinks: Sequence[CaptureWriter],
+        *,
+        limits: Limits | None = None,
+        listener: Callable[[TimedRecord], None] | None = None,
+        clock: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self.tally = Tally()
+        self._port = port
+        self._interface = interface
+        self._sinks = list(sinks)
+        self._limits = limits or Limits()
+        self._listener = listener
+        self._clock = clock
+        self._framer = Framer(interface.speed or 9600)
+        self._stop_asked = False
+        self._gone: list[CaptureWriter] = []  # pipes whose reader went away
+        self._waker, self._wake = socket.socketpair()
+        self._waker.setblocking(False)
+        self._wake.setblocking(False)
+
+    def stop(self) -> None:
+        """End the capture soon, in order. Safe from any thread and from a signal handler; may be called again."""
+        self._stop_asked = True
+        with contextlib.suppress(OSError):  # full: it is awake already; closed: it has ended already
+            self._wake.send(b"\x00")
+
+    def run(self, *, stop_signals: Sequence[signal.Signals] = ()) -> Tally:
+        """Capture until the end; what was heard, and why it ended.
+
+        stop_signals: these end the capture as ``stop`` does (main thread only). Raises CaptureError when a file could
+        not be written: it says how many records are safe and how many are lost.
+        """
+        with contextlib.ExitStack() as stack:
+            stack.callback(self._close)
+            stack.enter_context(self._stopped_by(stop_signals))
+            selector = stack.enter_context(_Selector())
+            started, start_ns = time.monotonic(), self._clock()
+            self._to_all(lambda sink: sink.add_interface(self._interface))
+            selector.register(self._port.fileno(), selectors.EVENT_READ, self._on_port)
+            selector.register(self._waker.fileno(), selectors.EVENT_READ, self._on_wake)
+            self.tally.end = self._listen(selector, started)
+            self._write(self._framer.flush())
+            self.tally.seconds = time.monotonic() - started
+            end_ns = self._clock()
+            self._to_all(
+                lambda sink: sink.write_statistics(
+                    0, start_ns=start_ns, end_ns=end_ns, received=sink.written + sink.lost, dropped=sink.lost
+                )
+            )
+        return self.tally
+
+    def _listen(self, selector: selectors.BaseSelector, started: float) -> End:
+        until = None if self._limits.duration is None else started + self._limits.duration
+        quiet_at: float | None = None
+        while True:
+            self._watch_pipes(selector)
+            moments = [moment for moment in (until, quiet_at) if moment is not None]
+            timeout = max(0.0, min(moments) - time.monotonic()) if moments else None
+            heard = [key.data() for key, _ in selector.select(timeout)]
+            now = time.monotonic()
+            if any(heard):
+                quiet_at = now + SILENCE_NS / 1e9 if self._framer.pending else None
+            elif quiet_at is not None and now >= quiet_at:
+                self._write(self._framer.flush())
+                quiet_at = None
+            self.tally.seconds = now - started
+            if limit := self._limit():
+                return limit
+            if self.tally.problem:
+                return End.PORT_LOST
+            if not self._sinks:
+                return End.READER_GONE
+            if self._stop_asked:
+                return End.STOPPED
+            if until is not None and now >= until:
+                return End.DURATION
+
+    def _limit(self) -> End | None:
+        """Tell which limit, if any, what was written has reached."""
+        limits = self._limits
+        if limits.packets is not None and self.tally.records >= limits.packets:
+            return End.PACKETS
+        if limits.filesize is not None and any(sink.output.size >= limits.filesize for sink in self._sinks):
+            return End.FILESIZE
+        return None
+
+    def _on_port(self) -> bool:
+        """Read once; True if bytes came."""
+        try:
+            data = self._port.read()
+        except PortError as error:
+            self._write(self._framer.flush())
+            self.tally.problem = str(error)
+            now_ns = self._clock()
+            comment = f"port lost: {error}"
+            self._to_all(lambda sink: sink.write_packet(now_ns, b"", comment=comment))
+            return False
+        if not data:
+            return False
+        now_ns = self._clock()
+        self.tally.bytes += len(data)
+        self._write(self._framer.feed(data, now_ns))
+        return True
+
+    def _on_wake(self) -> bool:
+        with contextlib.suppress(BlockingIOError):
+            self._waker.recv(READ_SIZE)
+        return False
+
+    def _write(self, records: list[TimedRecord]) -> None:
+        """Write records to all sinks, up to a limit: what comes behind it is not part of the capture."""
+        for index, timed in enumerate(records):
+            if self._limit():
+                return
+            try:
+                self._to_all(functools.partial(_put, timed))
+            except CaptureError:
+                self._give_up(len(records) - index - 1)
+            self.tally.records += 1
+            self.tally.kinds[timed.record.kind] += 1
+            if self._listener:
+                self._listener(timed)
+
+    def _give_up(self, unwritten: int) -> NoReturn:
+        """Count all that was heard and is in no file, as a file broke, and say so."""
+        unwritten += len(self._framer.flush())
+        broken = next(sink for sink in self._sinks if sink.failure)
+        broken.lost += unwritten
+        raise broken.broken() from broken.failure
+
+    def _to_all(self, write: Callable[[CaptureWriter], object]) -> None:
+        for sink in tuple(self._sinks):
+            self._to(sink, write)
+
+    def _to(self, sink: CaptureWriter, write: Callable[[CaptureWriter], object]) -> None:
+        """Write to one sink. A pipe whose reader went away is let go; any other failure is raised."""
+        try:
+            write(sink)
+        except CaptureError as error:
+            if not isinstance(sink.failure, BrokenPipeError):
+                raise
+            self._let_go(sink, str(error))
+
+    def _let_go(self, sink: CaptureWriter, note: str) -> None:
+        self._sinks.remove(sink)
+        self._gone.append(sink)
+        self.tally.notes.append(note)
+
+    def _watch_pipes(self, selector: selectors.BaseSelector) -> None:
+        """Have the selector tell when a pipe's reader goes away, and when it takes what waits for it."""
+        for sink in (*self._sinks, *self._gone):
+            output = sink.output
+            if not isinstance(output, PipeOutput):
+                continue
+            wanted = 0
+            if sink in self._sinks:
+                wanted = (selectors.EVENT_READ if output.is_pipe else 0) | (
+                    selectors.EVENT_WRITE if output.waiting else 0
+                )
+            known = selector.get_map().get(output.fileno())
+            if known and known.events == wanted:
+                continue
+            if known:
+                selector.unregister(output.fileno())
+            if wanted:
+                selector.register(output.fileno(), wanted, functools.partial(self._on_pipe, sink, output))
+
+    def _on_pipe(self, sink: CaptureWriter, output: PipeOutput) -> bool:
+        try:
+            output.pump()
+        except OSError as error:
+            sink.failure = error
+            if not isinstance(error, BrokenPipeError):
+                raise sink.broken() from error
+            self._let_go(sink, str(sink.broken()))
+        return False
+
+    @contextlib.contextmanager
+    def _stopped_by(self, signals: Sequence[signal.Signals]) -> Generator[None]:
+        if not signals:
+            yield
+            return
+
+        def handler(_number: int, _frame: FrameType | None) -> None:
+            self.stop()
+
+        before = {number: signal.signal(number, handler) for number in signals}
+        # A signal that comes just before poll sleeps would be seen too late by its handler; this wakes poll.
+        wakeup = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
+        try:
+            yield
+        finally:
+            signal.set_wakeup_fd(wakeup)
+            for number, previous in before.items():
+                signal.signal(number, previous)
+
+    def _close(self) -> None:
+        for sink in (*self._sinks, *self._gone):
+            sink.close()
+        self._waker.close()
+        self._wake.close()
+
+
+def _put(timed: TimedRecord, sink: CaptureWriter) -> None:
+    sink.write_packet(timed.time_ns, timed.record.data, flags=ERROR_FLAGS.get(timed.record.kind, 0))
