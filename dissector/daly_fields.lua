@@ -1,0 +1,228 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Every field and expert note of the protocol. `tshark -G fields` prints what is written here: each description says
+-- what the value is, its unit, and where that is known from ("V1.2": the paper Daly UART/485 V1.2; "field notes": what real
+-- devices do, see docs/protocol.md).
+
+local faults = require("daly_faults")
+
+local M = {}
+
+M.KINDS = { "frame", "bad_checksum", "short", "junk", "foreign", "event" }
+
+local DIRECTION = { [1] = "Request", [2] = "Reply", [3] = "Echo" }
+local CHECKSUM = { [0] = "Bad", [1] = "Good", [2] = "Unverified" }
+local STATE = { [0] = "stationary", [1] = "charging", [2] = "discharging" }
+local CHARGER = { [0] = "disconnected", [1] = "connected" }
+local FUNCTION = {
+  [0x03] = "Read registers",
+  [0x06] = "Write one register",
+  [0x10] = "Write registers",
+  [0x83] = "Exception to a read",
+  [0x86] = "Exception to a write of one",
+  [0x90] = "Exception to a write",
+}
+
+-- stylua: ignore
+M.DATA_IDS = {
+  [0x90] = "Pack",              -- SOC of total voltage & current
+  [0x91] = "Cell extremes",     -- Maximum & Minimum voltage
+  [0x92] = "Temp. extremes",    -- Maximum & Minimum temperature
+  [0x93] = "MOS status",        -- Charge & discharge MOS status
+  [0x94] = "Status",            -- Status information 1
+  [0x95] = "Cell voltages",     -- Cell voltage 1~48
+  [0x96] = "Temperatures",      -- Cell temperature 1~16
+  [0x97] = "Balance",           -- Cell balance State 1~48
+  [0x98] = "Faults",            -- Battery failure status
+}
+
+M.STATE = STATE
+
+local fields = {} -- by short name
+local list = {} -- as Wireshark wants them
+
+local function add(short, abbreviation, make)
+  local field = make("daly." .. abbreviation)
+  fields[short] = field
+  list[#list + 1] = field
+end
+
+local function u8(name, text, values, description)
+  return function(abbreviation)
+    return ProtoField.uint8(abbreviation, name, values and base.DEC or base.DEC, values, nil, description or text)
+  end
+end
+
+local function plain(make, name, description)
+  return function(abbreviation)
+    return make(abbreviation, name, base.DEC, nil, nil, description)
+  end
+end
+
+local function hex(make, name, description, values)
+  return function(abbreviation)
+    return make(abbreviation, name, base.HEX, values, nil, description)
+  end
+end
+
+local function number(name, description)
+  return plain(ProtoField.uint8, name, description)
+end
+
+local function named(name, values, description)
+  return u8(name, nil, values, description)
+end
+
+local function double(name, description)
+  return function(abbreviation)
+    return ProtoField.double(abbreviation, name, nil, description)
+  end
+end
+
+local function text(name, description)
+  return function(abbreviation)
+    return ProtoField.string(abbreviation, name, base.UNICODE, description)
+  end
+end
+
+local function bytes(name, description)
+  return function(abbreviation)
+    return ProtoField.bytes(abbreviation, name, base.NONE, description)
+  end
+end
+
+local function boolean(name, description)
+  return function(abbreviation)
+    return ProtoField.bool(abbreviation, name, base.NONE, nil, nil, description)
+  end
+end
+
+local function packet(name, kind, description)
+  return function(abbreviation)
+    return ProtoField.framenum(abbreviation, name, base.NONE, kind, nil, description)
+  end
+end
+
+local u16, u32 = ProtoField.uint16, ProtoField.uint32
+
+-- stylua: ignore start
+
+-- Every record.
+add("kind",           "kind",             text("Record",         "What the record is: frame, bad_checksum, short, junk, foreign, event; generated (docs/records.md)"))
+add("transport",      "transport",        text("Transport",      "The medium: uart; generated"))
+add("dialect",        "dialect",          text("Dialect",        "a5, d2 or 81: which of Daly's protocols; generated"))
+add("undecoded",      "undecoded",        bytes("Bytes",         "Bytes that are shown as they are"))
+add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, or Sinowealth with right CRC-8; generated"))
+add("continued_in",   "continued_in",     packet("Continued in", frametype.NONE, "Packet in which the record that begins here ends; generated"))
+add("began_in",       "began_in",         packet("Began in",     frametype.NONE, "Packet in which this record began; generated"))
+
+-- Frame, V1.2 section 2.3.
+add("start",          "start",            hex(ProtoField.uint8, "Start flag", "A5, fixed; V1.2 2.3"))
+add("address",        "address",          hex(ProtoField.uint8, "Address",    "Request: who asks, 40 PC, 80 Bluetooth app, 20 GPRS, 41..4F PC to board 2..16; reply: board number; V1.2 2.2, field notes fact 3"))
+add("data_id",        "data_id",          hex(ProtoField.uint8, "Data ID",    "What is asked or answered; V1.2 section 3", M.DATA_IDS))
+add("length",         "length",           plain(ProtoField.uint8, "Data length", "Bytes of data, always 8; V1.2 2.3"))
+add("data",           "data",             bytes("Data",          "The eight data bytes; V1.2 2.3"))
+add("checksum",       "checksum",         hex(ProtoField.uint8, "Checksum",   "Low byte of the sum of all bytes before; V1.2 2.3 note 2"))
+add("checksum_status", "checksum.status", named("Checksum status", CHECKSUM,  "0 Bad, 1 Good, 2 Unverified; generated"))
+
+-- What the frame is to others, docs/records.md 5 to 7.
+add("direction",      "direction",        named("Direction", DIRECTION,      "1 request (address 20 hex and up), 2 reply, 3 echo of a request; generated, field notes facts 3 and 4"))
+add("board",          "board",            number("Board",                    "Board 1..16 that is asked or answers, absent when not known; generated, field notes b"))
+add("retry",          "retry",            boolean("Retry",                   "The same request was sent before and is still unanswered; generated"))
+add("request_in",     "request_in",       packet("Request in", frametype.REQUEST, "Packet of the request that this replies to; generated"))
+add("reply_in",       "reply_in",         packet("Reply in", frametype.RESPONSE, "Packet of the first reply to this request, known in a second pass (-2); generated"))
+add("response_time",  "response_time",    double("Response time",            "From the request's last byte to the reply's first, s; generated from time stamps, position in the packet and baud rate"))
+
+-- 0x90, V1.2 section 3.
+add("pack_voltage",   "pack.voltage",     double("Pack voltage",             "Cumulative total voltage, V; V1.2 0x90 bytes 0-1, 0.1 V"))
+add("gather_voltage", "pack.gather_voltage", double("Gather voltage",        "Gather total voltage, V; V1.2 0x90 bytes 2-3, 0.1 V; 0 on every device seen"))
+add("current",        "pack.current",     double("Current",                  "Current as sent, (raw - 30000) / 10, A; V1.2 0x90 bytes 4-5; which sign is charging differs between boards, see daly.pack.state"))
+add("current_raw",    "pack.current_raw", plain(u16, "Current, raw",         "Current as on the wire, offset 30000, 0.1 A; V1.2 0x90 bytes 4-5"))
+add("soc",            "soc",              double("SOC",                      "State of charge, %; V1.2 0x90 bytes 6-7, 0.1 %"))
+add("pack_state",     "pack.state",       named("State", STATE,              "State in the newest 0x93 of this board, beside the current whose sign does not tell it; 0 stationary, 1 charging, 2 discharging; generated"))
+
+-- 0x91.
+add("cell_max",       "cell.max_voltage", plain(u16, "Highest cell voltage", "Maximum cell voltage, mV; V1.2 0x91 bytes 0-1"))
+add("cell_max_number", "cell.max_number", number("Highest cell",             "Number of the cell with the maximum voltage; V1.2 0x91 byte 2"))
+add("cell_min",       "cell.min_voltage", plain(u16, "Lowest cell voltage",  "Minimum cell voltage, mV; V1.2 0x91 bytes 3-4"))
+add("cell_min_number", "cell.min_number", number("Lowest cell",              "Number of the cell with the minimum voltage; V1.2 0x91 byte 5"))
+
+-- 0x92.
+add("temp_max",       "temperature.max",  plain(ProtoField.int16, "Highest temperature", "Maximum temperature, C; V1.2 0x92 byte 0, offset 40; -40 and 215 mean no sensor (field notes a.92)"))
+add("temp_max_number", "temperature.max_number", number("Hottest sensor",    "Number of the sensor with the maximum temperature; V1.2 0x92 byte 1"))
+add("temp_min",       "temperature.min",  plain(ProtoField.int16, "Lowest temperature", "Minimum temperature, C; V1.2 0x92 byte 2, offset 40"))
+add("temp_min_number", "temperature.min_number", number("Coldest sensor",    "Number of the sensor with the minimum temperature; V1.2 0x92 byte 3"))
+
+-- 0x93.
+add("state",          "state",            named("State", STATE,              "0 stationary, 1 charging, 2 discharging; V1.2 0x93 byte 0"))
+add("mos_charge",     "mos.charge",       boolean("Charge MOS",              "Charge MOS on; V1.2 0x93 byte 1"))
+add("mos_discharge",  "mos.discharge",    boolean("Discharge MOS",           "Discharge MOS on; V1.2 0x93 byte 2"))
+add("life",           "life",             number("Life",                     "BMS life, a counter that runs 0..255, not charge cycles; V1.2 0x93 byte 3"))
+add("remaining",      "remaining_capacity", plain(u32, "Remaining capacity", "Remaining capacity, mAh; V1.2 0x93 bytes 4-7"))
+
+-- 0x94.
+add("cell_count",     "cell_count",       number("Cells",                    "Cells in series; V1.2 0x94 byte 0"))
+add("sensor_count",   "sensor_count",     number("Temperature sensors",      "Temperature sensors; V1.2 0x94 byte 1"))
+add("charger",        "charger",          named("Charger", CHARGER,          "0 disconnected, 1 connected; V1.2 0x94 byte 2; often 0 while charging (field notes a.94)"))
+add("load",           "load",             named("Load", CHARGER,             "0 disconnected, 1 connected; V1.2 0x94 byte 3"))
+for i = 1, 4 do
+  add("di" .. i,      "di" .. i,          boolean("DI" .. i,                 "Input DI" .. i .. "; V1.2 0x94 byte 4 bit " .. (i - 1)))
+end
+for i = 1, 4 do
+  add("do" .. i,      "do" .. i,          boolean("DO" .. i,                 "Output DO" .. i .. "; V1.2 0x94 byte 4 bit " .. (i + 3)))
+end
+add("cycles",         "cycles",           plain(u16, "Charge cycles",        "Charge cycles; 0x94 bytes 5-6: reserved in V1.2, cycles in V1.0 and in every driver (field notes a.94)"))
+
+-- 0x95, 0x96.
+add("frame_number",   "frame_number",     number("Frame number",             "Which frame of several; V1.2 0x95, 0x96 byte 0: from 0, FF invalid; every device seen counts from 1 (field notes fact 1)"))
+add("cell_voltage",   "cell.voltage",     plain(u16, "Cell voltage",         "Voltage of one cell, mV, once per cell in order; V1.2 0x95 bytes 1-6"))
+add("temperature",    "temperature",      plain(ProtoField.int16, "Temperature", "Temperature of one sensor, C, once per sensor in order; V1.2 0x96 bytes 1-7, offset 40; -40 and 215 mean no sensor"))
+add("missing",        "burst.missing",    number("Missing frame",            "Number of a frame that is missing before this one; generated (docs/records.md 8)"))
+add("again",          "burst.repeat",     boolean("Repeated frame",          "The burst had this frame number before; generated (docs/records.md 8)"))
+add("cells_voltage",  "cells.voltage",    plain(u16, "All cells",            "Voltages of all cells, mV, in order, in the record that completes the burst; generated from 0x95"))
+add("cells_count",    "cells.count",      number("Number of cells",          "Cells in this table; generated from 0x95"))
+add("cells_min",      "cells.min",        plain(u16, "Lowest",               "Lowest of all cells, mV; generated from 0x95"))
+add("cells_max",      "cells.max",        plain(u16, "Highest",              "Highest of all cells, mV; generated from 0x95"))
+add("cells_average",  "cells.average",    double("Average",                  "Average of all cells, mV; generated from 0x95"))
+add("cells_spread",   "cells.spread",     plain(u16, "Spread",               "Highest minus lowest of all cells, mV; generated from 0x95"))
+
+-- 0x97.
+add("balance_mask",   "balance.mask",     hex(ProtoField.uint64, "Balance mask", "Bit 0 = cell 1: 0 closed, 1 open; V1.2 0x97 bits 0-47"))
+add("balance_cell",   "balance.cell",     number("Balancing cell",           "Number of a cell whose bit is set in the mask; V1.2 0x97"))
+add("balance_active", "balance.active_cell", number("Active balance cell",   "Byte 1 as boards with an active balancer mean it: number of the cell being balanced, 0 none; field notes a.97, not in V1.2"))
+
+-- 0x98.
+for _, bit in ipairs(faults.BITS) do
+  local source = bit.state and "field notes a.98; reserved in V1.2" or "V1.2"
+  add("fault." .. bit[3], "fault." .. bit[3], boolean(bit[4],                "1 error, 0 none; " .. source .. " 0x98 byte " .. bit[1] .. " bit " .. bit[2]))
+end
+add("fault_code",     "fault_code",       number("Fault code",               "Fault code, 0 none; V1.2 0x98 byte 7"))
+add("fault_count",    "fault_count",      number("Faults",                   "How many of the paper's 48 fault bits are set; generated"))
+add("fault_raised",   "fault_raised",     text("Raised",                     "Name of a bit that came since the last 0x98 of this board; generated"))
+add("fault_cleared",  "fault_cleared",    text("Cleared",                    "Name of a bit that went since the last 0x98 of this board; generated"))
+
+add("reserved",       "reserved",         bytes("Reserved",                  "Reserved bytes and slots of no cell: stale bytes on many boards (field notes fact 2)"))
+
+-- Modbus RTU; what its registers mean is not decoded yet.
+add("modbus_address", "modbus.address",   hex(ProtoField.uint8, "Modbus address", "D2 both ways; 80+N request, 50+N reply of board N; field notes fact 8"))
+add("modbus_function", "modbus.function", hex(ProtoField.uint8, "Function",  "03, 06, 10; exceptions 83, 86, 90; vendor's article of 2024, section 3", FUNCTION))
+add("modbus_crc",     "modbus.crc",       hex(u16, "CRC",                    "CRC-16, low byte first; vendor's article of 2024, section 3"))
+add("modbus_crc_status", "modbus.crc.status", named("CRC status", CHECKSUM,  "0 Bad, 1 Good, 2 Unverified; generated"))
+
+-- stylua: ignore end
+
+M.fields = fields
+M.list = list
+
+-- stylua: ignore
+M.experts = {
+  bad_checksum = ProtoExpert.new("daly.checksum.bad", "Checksum is wrong", expert.group.CHECKSUM, expert.severity.ERROR),
+  short = ProtoExpert.new("daly.short", "Frame is cut off", expert.group.MALFORMED, expert.severity.WARN),
+  junk = ProtoExpert.new("daly.junk", "Bytes that are no frame", expert.group.UNDECODED, expert.severity.NOTE),
+  echo = ProtoExpert.new("daly.echo", "Echo of the request: the BMS sleeps, or the adapter hears itself", expert.group.RESPONSE_CODE, expert.severity.NOTE),
+  severe = ProtoExpert.new("daly.fault.severe", "Level 2 fault", expert.group.RESPONSE_CODE, expert.severity.WARN),
+  missing = ProtoExpert.new("daly.burst.incomplete", "Frame missing in a burst", expert.group.SEQUENCE, expert.severity.WARN),
+  again = ProtoExpert.new("daly.burst.repeated", "Frame repeated in a burst", expert.group.SEQUENCE, expert.severity.WARN),
+}
+
+return M

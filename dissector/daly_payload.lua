@@ -1,0 +1,410 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- The eight data bytes of a reply, by data ID (paper, section 3): as fields of the tree, and as a few words for the Info
+-- column. All numbers of several bytes are big-endian.
+--
+--   M.show[id](frame, out)     adds the fields
+--   M.words[id](frame)         returns the words
+--
+-- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, cells = table of all cells or nil }; data byte 0 is the
+-- fifth byte of raw. `out` adds: out.bytes(field, byte, length, unit) the bytes as they are; out.value(field, byte, length, value,
+-- unit) a value computed from them; out.made(field, value, unit) a generated one.
+
+local fields = require("daly_fields").fields
+local data_ids = require("daly_fields")
+local faults = require("daly_faults")
+local bus = require("daly_bus")
+
+local M = { show = {}, words = {} }
+local show, words = M.show, M.words
+
+local byte, format, floor, concat = string.byte, string.format, math.floor, table.concat
+
+local function state_name(state)
+  return data_ids.STATE[state] or format("state %d", state)
+end
+
+local function on(value)
+  return value ~= 0 and "on" or "off"
+end
+
+local function signed_tenths(value)
+  return format("%.1f", value)
+end
+
+-- The burst that a 0x95, 0x96 or text frame belongs to, and what was odd about the frame.
+local function burst_of(frame)
+  local memory = frame.memory
+  if memory and memory.burst then
+    return memory.burst, memory
+  end
+  return memory, nil
+end
+
+-- 0x90: voltage.2 gather.2 current.2 soc.2
+show[0x90] = function(frame, out)
+  local _, _, _, _, a, b, c, d, e, f, g, h = byte(frame.raw, 1, 12)
+  out.value(fields.pack_voltage, 0, 2, (a * 256 + b) / 10, " V")
+  out.value(fields.gather_voltage, 2, 2, (c * 256 + d) / 10, " V")
+  out.value(fields.current, 4, 2, (e * 256 + f - 30000) / 10, " A")
+  out.bytes(fields.current_raw, 4, 2)
+  out.value(fields.soc, 6, 2, (g * 256 + h) / 10, " %")
+  if frame.memory then
+    out.made(fields.pack_state, frame.memory)
+  end
+end
+
+words[0x90] = function(frame)
+  local _, _, _, _, a, b, _, _, e, f, g, h = byte(frame.raw, 1, 12)
+  local state = frame.memory and format(" (%s)", state_name(frame.memory)) or ""
+  return format(
+    "%.1f V  %s A%s  SOC %.1f %%",
+    (a * 256 + b) / 10,
+    signed_tenths((e * 256 + f - 30000) / 10),
+    state,
+    (g * 256 + h) / 10
+  )
+end
+
+-- 0x91: max.2 number.1 min.2 number.1 reserved.2
+show[0x91] = function(_, out)
+  out.bytes(fields.cell_max, 0, 2, " mV")
+  out.bytes(fields.cell_max_number, 2, 1)
+  out.bytes(fields.cell_min, 3, 2, " mV")
+  out.bytes(fields.cell_min_number, 5, 1)
+  out.bytes(fields.reserved, 6, 2)
+end
+
+words[0x91] = function(frame)
+  local _, _, _, _, a, b, c, d, e, f = byte(frame.raw, 1, 10)
+  return format("max %d mV (cell %d)  min %d mV (cell %d)", a * 256 + b, c, d * 256 + e, f)
+end
+
+-- 0x92: max.1 number.1 min.1 number.1 reserved.4
+show[0x92] = function(frame, out)
+  local _, _, _, _, a, _, c = byte(frame.raw, 1, 7)
+  out.value(fields.temp_max, 0, 1, a - 40, " C")
+  out.bytes(fields.temp_max_number, 1, 1)
+  out.value(fields.temp_min, 2, 1, c - 40, " C")
+  out.bytes(fields.temp_min_number, 3, 1)
+  out.bytes(fields.reserved, 4, 4)
+end
+
+words[0x92] = function(frame)
+  local _, _, _, _, a, b, c, d = byte(frame.raw, 1, 8)
+  return format("max %d C (sensor %d)  min %d C (sensor %d)", a - 40, b, c - 40, d)
+end
+
+-- 0x93: state.1 charge_mos.1 discharge_mos.1 life.1 remaining.4
+show[0x93] = function(frame, out)
+  local _, _, _, _, _, b, c = byte(frame.raw, 1, 7)
+  out.bytes(fields.state, 0, 1)
+  out.value(fields.mos_charge, 1, 1, b ~= 0)
+  out.value(fields.mos_discharge, 2, 1, c ~= 0)
+  out.bytes(fields.life, 3, 1)
+  out.bytes(fields.remaining, 4, 4, " mAh")
+end
+
+words[0x93] = function(frame)
+  local _, _, _, _, a, b, c, _, e, f, g, h = byte(frame.raw, 1, 12)
+  return format(
+    "%s  charge MOS %s  discharge MOS %s  remaining %.0f mAh",
+    state_name(a),
+    on(b),
+    on(c),
+    ((e * 256 + f) * 256 + g) * 256 + h
+  )
+end
+
+-- 0x94: cells.1 sensors.1 charger.1 load.1 dio.1 cycles.2 reserved.1
+show[0x94] = function(frame, out)
+  local dio = byte(frame.raw, 9)
+  out.bytes(fields.cell_count, 0, 1)
+  out.bytes(fields.sensor_count, 1, 1)
+  out.bytes(fields.charger, 2, 1)
+  out.bytes(fields.load, 3, 1)
+  for i = 0, 3 do
+    out.value(fields["di" .. (i + 1)], 4, 1, floor(dio / 2 ^ i) % 2 == 1)
+  end
+  for i = 0, 3 do
+    out.value(fields["do" .. (i + 1)], 4, 1, floor(dio / 2 ^ (i + 4)) % 2 == 1)
+  end
+  out.bytes(fields.cycles, 5, 2)
+  out.bytes(fields.reserved, 7, 1)
+end
+
+words[0x94] = function(frame)
+  local _, _, _, _, a, b, c, d, _, f, g = byte(frame.raw, 1, 11)
+  return format(
+    "%d cells  %d sensors  charger %s  load %s  %d cycles",
+    a,
+    b,
+    c ~= 0 and "connected" or "disconnected",
+    d ~= 0 and "connected" or "disconnected",
+    f * 256 + g
+  )
+end
+
+local function show_burst(odd, out)
+  if not odd then
+    return
+  end
+  if odd.missing then
+    for i = 1, #odd.missing do
+      out.made(fields.missing, odd.missing[i])
+    end
+  end
+  if odd.again then
+    out.made(fields.again, true)
+  end
+end
+
+-- How many of the slots of a frame hold something real: all when the count is not known.
+local function real_slots(burst, frame, per_frame)
+  local first = per_frame * (byte(frame.raw, 5) - burst.base)
+  if not burst.count then
+    return per_frame, first
+  end
+  return math.max(0, math.min(per_frame, burst.count - first)), first
+end
+
+--- The table of all cells, if this frame carries it: a list of mV. `again`: the capture was read to its end.
+function M.cells(slot, memory, again)
+  if not memory then
+    return nil
+  end
+  if memory.table then
+    return memory.table
+  end
+  local burst = memory.burst or memory
+  if again and burst.id == 0x95 and not burst.count and burst.last == slot and burst.whole then
+    return burst.cells
+  end
+  return nil
+end
+
+local function statistics(cells)
+  local lowest, highest, sum = cells[1], cells[1], 0
+  for i = 1, #cells do
+    local v = cells[i]
+    sum = sum + v
+    if v < lowest then
+      lowest = v
+    end
+    if v > highest then
+      highest = v
+    end
+  end
+  return lowest, highest, sum / #cells
+end
+
+-- 0x95: frame_number.1 cell.2 cell.2 cell.2 reserved.1
+show[0x95] = function(frame, out)
+  local burst, odd = burst_of(frame)
+  out.bytes(fields.frame_number, 0, 1)
+  show_burst(odd, out)
+  if not burst then
+    out.bytes(fields.reserved, 1, 7)
+    return
+  end
+  local real, before = real_slots(burst, frame, 3)
+  for i = 0, real - 1 do
+    out.cell(fields.cell_voltage, 1 + 2 * i, 2, before + i + 1, " mV")
+  end
+  out.bytes(fields.reserved, 1 + 2 * real, 7 - 2 * real)
+  local cells = frame.cells
+  if cells then
+    local lowest, highest, average = statistics(cells)
+    for i = 1, #cells do
+      out.made(fields.cells_voltage, cells[i], " mV")
+    end
+    out.made(fields.cells_count, #cells)
+    out.made(fields.cells_min, lowest, " mV")
+    out.made(fields.cells_max, highest, " mV")
+    out.made(fields.cells_average, average, " mV")
+    out.made(fields.cells_spread, highest - lowest, " mV")
+  end
+end
+
+words[0x95] = function(frame)
+  local burst = burst_of(frame)
+  local _, _, _, _, n, a, b, c, d, e, f = byte(frame.raw, 1, 11)
+  if not burst then
+    return format("frame %d", n)
+  end
+  local real, before = real_slots(burst, frame, 3)
+  local list = { format("frame %d", n) }
+  local values = { a * 256 + b, c * 256 + d, e * 256 + f }
+  if real > 0 then
+    list[2] = format(" cells %d-%d:", before + 1, before + real)
+    for i = 1, real do
+      list[#list + 1] = format("%d", values[i])
+    end
+    list[#list + 1] = "mV"
+  end
+  local cells = frame.cells
+  if cells then
+    local lowest, highest, average = statistics(cells)
+    list[#list + 1] = format(
+      " all %d: min %d  max %d  average %.0f  spread %d mV",
+      #cells,
+      lowest,
+      highest,
+      average,
+      highest - lowest
+    )
+  end
+  return concat(list, " ")
+end
+
+-- 0x96: frame_number.1 temperature.1 x 7
+show[0x96] = function(frame, out)
+  local burst, odd = burst_of(frame)
+  out.bytes(fields.frame_number, 0, 1)
+  show_burst(odd, out)
+  if not burst then
+    out.bytes(fields.reserved, 1, 7)
+    return
+  end
+  local real = real_slots(burst, frame, 7)
+  for i = 1, real do
+    out.value(fields.temperature, i, 1, byte(frame.raw, 5 + i) - 40, " C")
+  end
+  if real < 7 then
+    out.bytes(fields.reserved, 1 + real, 7 - real)
+  end
+end
+
+words[0x96] = function(frame)
+  local burst = burst_of(frame)
+  local list = { format("frame %d", byte(frame.raw, 5)) }
+  local real = burst and real_slots(burst, frame, 7) or 0
+  if real > 0 then
+    list[2] = ""
+    for i = 1, real do
+      list[#list + 1] = format("%d", byte(frame.raw, 5 + i) - 40)
+    end
+    list[#list + 1] = "C"
+  end
+  return concat(list, " ")
+end
+
+-- 0x97: mask.6 (byte 0 bit 0 = cell 1) reserved.2
+show[0x97] = function(frame, out)
+  out.little(fields.balance_mask, 0, 6)
+  for i = 0, 5 do
+    local bits = byte(frame.raw, 5 + i)
+    for k = 0, 7 do
+      if floor(bits / 2 ^ k) % 2 == 1 then
+        out.value(fields.balance_cell, i, 1, 8 * i + k + 1)
+      end
+    end
+  end
+  out.bytes(fields.balance_active, 1, 1)
+  out.bytes(fields.reserved, 6, 2)
+end
+
+words[0x97] = function(frame)
+  local list = {}
+  for i = 0, 5 do
+    local bits = byte(frame.raw, 5 + i)
+    for k = 0, 7 do
+      if floor(bits / 2 ^ k) % 2 == 1 then
+        list[#list + 1] = format("%d", 8 * i + k + 1)
+      end
+    end
+  end
+  if #list == 0 then
+    return "none"
+  end
+  local active = byte(frame.raw, 6)
+  return "cells " .. concat(list, " ") .. (active ~= 0 and format("  (active balancer: cell %d)", active) or "")
+end
+
+-- 0x98: bits.7 code.1
+show[0x98] = function(frame, out)
+  local raw = frame.raw
+  for i = 1, #faults.BITS do
+    local bit = faults.BITS[i]
+    out.value(fields["fault." .. bit[3]], bit[1], 1, faults.is_set(raw, 5, bit))
+  end
+  out.bytes(fields.fault_code, 7, 1)
+  local _, count = faults.read(raw, 5)
+  out.made(fields.fault_count, count)
+  if frame.memory then
+    local raised, cleared = faults.changes(frame.memory, 1, raw, 5)
+    for i = 1, #raised do
+      out.made(fields.fault_raised, raised[i])
+    end
+    for i = 1, #cleared do
+      out.made(fields.fault_cleared, cleared[i])
+    end
+  end
+end
+
+local NO_FAULTS = ("\0"):rep(8)
+
+words[0x98] = function(frame)
+  local data = frame.raw:sub(5, 12)
+  if data == NO_FAULTS and (not frame.memory or frame.memory == NO_FAULTS) then
+    return "none"
+  end
+  local names = faults.read(frame.raw, 5)
+  local list = { #names > 0 and concat(names, ", ") or "none" }
+  local code = byte(frame.raw, 12)
+  if code ~= 0 then
+    list[#list + 1] = format("fault code %d", code)
+  end
+  if frame.memory then
+    local raised, cleared = faults.changes(frame.memory, 1, frame.raw, 5)
+    if #raised > 0 then
+      list[#list + 1] = "raised: " .. concat(raised, ", ")
+    end
+    if #cleared > 0 then
+      list[#list + 1] = "cleared: " .. concat(cleared, ", ")
+    end
+  end
+  return concat(list, "  ")
+end
+
+-- Texts over several frames: the characters are put together in a later version; the frame's number tells its place.
+local function show_text(frame, out)
+  local _, odd = burst_of(frame)
+  out.bytes(fields.frame_number, 0, 1)
+  show_burst(odd, out)
+end
+
+for id in pairs(bus.BURST_IDS) do
+  show[id] = show[id] or show_text
+end
+
+--- What is wrong with a reply: a list of { expert's name, words }.
+function M.complaints(id, frame)
+  local list = {}
+  if id == 0x98 then
+    local data = frame.raw:sub(5, 12)
+    if data ~= NO_FAULTS then
+      local names, _, severe = faults.read(frame.raw, 5)
+      if severe then
+        local level_2 = {}
+        for i = 1, #names do
+          if names[i]:sub(-8) == "_level_2" then
+            level_2[#level_2 + 1] = names[i]
+          end
+        end
+        list[1] = { "severe", "Level 2 fault: " .. concat(level_2, ", ") }
+      end
+    end
+  elseif bus.BURST_IDS[id] then
+    local _, odd = burst_of(frame)
+    if odd and odd.missing then
+      list[#list + 1] = { "missing", format("%d missing before this frame of the burst", #odd.missing) }
+    end
+    if odd and odd.again then
+      list[#list + 1] = { "again", "The burst had this frame number before" }
+    end
+  end
+  return list
+end
+
+return M

@@ -1,0 +1,342 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Packets in, records out: which records end in which packet, however the stream was cut (docs/records.md 1 to 4, 10).
+-- Pure Lua, no Wireshark: a packet is a number, a time (s) and a string.
+--
+-- The capture is read once in order (`first`); what was found is kept, and any packet can then be looked up again in any
+-- order (`again`). An ordinary packet - one whole frame, nothing held before or behind it - keeps nothing here at all.
+--
+-- A plan is what a packet shows. Its items, in order:
+--
+--   { kind =, at =, length =, dialect =, name =, slot =, bytes =, since = }
+--       a record that ends here; at: offset in the packet (0: its first byte); one that began in an earlier packet has its
+--       whole `bytes`, and `since`, the number of that packet
+--   { part = number, at =, length = }   bytes of a record that ends in packet `number`
+
+local records = require("daly_records")
+local bus_module = require("daly_bus")
+
+local M = {}
+
+local byte, find, sub = string.byte, string.find, string.sub
+
+-- In a clean frame, what makes it less than clear: the start of another A5 frame, or a Modbus address and function.
+local INNER_A5 = "\xA5"
+local INNER_MODBUS = "[\xD2\x51-\x60\x81-\x90][\x03\x06\x10\x83\x86\x90]"
+
+--- Everything known of one capture. `options`: baud; quiet, echo, reply, burst in seconds.
+function M.capture(options)
+  return {
+    options = options,
+    byte_time = 10 / options.baud,
+    streams = {}, -- by key
+    buses = {}, -- by name
+    plans = {}, -- by packet number
+    results = bus_module.results(),
+    slots = 0, -- slots given to frames that are not a packet's only content, counted down from -1
+  }
+end
+
+local function bus_of(capture, name)
+  local bus = capture.buses[name]
+  if not bus then
+    bus = bus_module.new(capture.options, capture.results)
+    capture.buses[name] = bus
+  end
+  return bus
+end
+
+--- The stream of one interface and direction. `side`: tells the sides of a two-port tap apart, or nil.
+function M.stream(capture, key, bus_name, side)
+  local stream = capture.streams[key]
+  if not stream then
+    stream = {
+      cutter = records.new(),
+      bus = bus_of(capture, bus_name),
+      side = side,
+      packets = {}, -- those with bytes in the cutter, oldest first: { number, time, first, last, plan }
+      ended = nil, -- when the last packet's last byte ended
+      total = 0, -- bytes so far
+      tentative = nil, -- items, by position, of frames that are fed but not certain
+    }
+    capture.streams[key] = stream
+  end
+  return stream
+end
+
+-- The packet in which a position lies, and its index.
+local function packet_at(packets, position, from)
+  for i = from or 1, #packets do
+    if position <= packets[i].last then
+      return packets[i], i
+    end
+  end
+end
+
+local function put(plan, list, item)
+  local items = plan[list]
+  if not items then
+    items = {}
+    plan[list] = items
+  end
+  items[#items + 1] = item
+end
+
+-- Lay one record out over the packets it lies in; returns the item of the packet in which it ends.
+local function lay_out(stream, record, list, held, held_base)
+  local packets = stream.packets
+  local packet, index = packet_at(packets, record.first)
+  if record.last <= packet.last then
+    local item = {
+      kind = record.kind,
+      dialect = record.dialect,
+      name = record.name,
+      at = record.first - packet.first,
+      length = record.last - record.first + 1,
+    }
+    put(packet.plan, list, item)
+    return item, packet, packet
+  end
+  local divided = record.kind == "junk" or record.kind == "short"
+  local final, final_index = packet_at(packets, record.last, index)
+  local item
+  for i = index, final_index do
+    local here = packets[i]
+    local first, last = math.max(record.first, here.first), math.min(record.last, here.last)
+    if first <= last then
+      local piece = { at = first - here.first, length = last - first + 1 }
+      if divided then
+        piece.kind = record.kind
+      elseif here ~= final then
+        piece.part = final.number
+      else
+        piece.kind, piece.dialect, piece.name = record.kind, record.dialect, record.name
+        piece.since = packet.number
+        piece.bytes = sub(held, record.first - held_base + 1, record.last - held_base + 1)
+      end
+      put(here.plan, list, piece)
+      item = piece
+    end
+  end
+  return item, packet, final
+end
+
+local function new_slot(capture)
+  capture.slots = capture.slots - 1
+  return capture.slots
+end
+
+local function feed(stream, frame)
+  bus_module.feed(stream.bus, frame.slot, frame.number, frame.raw, frame.starts, frame.ends, stream.side, stream)
+end
+
+-- Lay out records; returns the A5 frames among them, to be fed.
+local function settle(capture, stream, found, list, held, held_base)
+  local frames, byte_time = {}, capture.byte_time
+  for i = 1, #found do
+    local record = found[i]
+    local item, from, to = lay_out(stream, record, list, held, held_base)
+    if record.dialect == "a5" then
+      local known = stream.tentative and stream.tentative[record.first]
+      item.slot = known and known.slot or new_slot(capture)
+      frames[#frames + 1] = {
+        first = record.first,
+        slot = item.slot,
+        number = to.number,
+        raw = sub(held, record.first - held_base + 1, record.last - held_base + 1),
+        starts = from.time + (record.first - from.first) * byte_time,
+        ends = to.time + (record.last - to.first + 1) * byte_time,
+        known = known ~= nil,
+      }
+    end
+  end
+  return frames
+end
+
+-- Packets whose bytes are all settled are done.
+local function drop_settled(stream)
+  local packets, base = stream.packets, stream.cutter.base
+  local done = 0
+  while packets[done + 1] and packets[done + 1].last < base do
+    packets[done + 1].plan.open = nil
+    done = done + 1
+  end
+  if done > 0 then
+    local left = {}
+    for i = done + 1, #packets do
+      left[#left + 1] = packets[i]
+    end
+    stream.packets = left
+  end
+end
+
+-- Take what is certain after `data`, lay it out, and tell the bus. What is held shows provisionally.
+local function advance(capture, stream, data, final)
+  local cutter = stream.cutter
+  local held, held_base = cutter.buf .. data, cutter.base
+  local found = records.take(cutter, data, final)
+  local frames = settle(capture, stream, found, "items", held, held_base)
+  local certain = #frames
+  local uncertain = cutter.waiting and records.peek(cutter) or nil
+  -- What was shown provisionally of bytes that are still held is shown anew.
+  for i = 1, #stream.packets do
+    local packet = stream.packets[i]
+    if packet.last >= cutter.base and (uncertain or packet.first < cutter.base or packet.plan.guess) then
+      packet.plan.held = nil
+    end
+  end
+  if uncertain then
+    local more = settle(capture, stream, uncertain, "held", held, held_base)
+    for i = 1, #more do
+      frames[#frames + 1] = more[i]
+    end
+  end
+  for i = 1, #stream.packets do
+    local packet = stream.packets[i]
+    packet.plan.guess = uncertain ~= nil or nil
+    if not uncertain and packet.last >= cutter.base and not packet.plan.held then
+      local first = math.max(packet.first, cutter.base)
+      local bytes = sub(cutter.buf, first - cutter.base + 1, packet.last - cutter.base + 1)
+      local shown = records.as_gap(bytes, first)
+      for k = 1, #shown do
+        put(packet.plan, "held", {
+          kind = shown[k].kind,
+          name = shown[k].name,
+          at = shown[k].first - packet.first,
+          length = shown[k].last - shown[k].first + 1,
+        })
+      end
+    end
+  end
+  -- The bus: what was fed before as uncertain stands if it comes again, first and in the same order.
+  local fed, others = 0, nil
+  local tentative = stream.tentative
+  if tentative then
+    local same = #frames >= tentative.count
+    for i = 1, tentative.count do
+      same = same and frames[i] and frames[i].known and frames[i].first == tentative.order[i]
+    end
+    if same then
+      fed = tentative.count
+      if certain >= fed then
+        bus_module.confirm(stream.bus, stream)
+      end
+    else
+      others = bus_module.rewind(stream.bus, stream)
+      if others then
+        for i = 1, #frames do
+          frames[i].known = false
+        end
+      end
+    end
+    stream.tentative = nil
+  end
+  for i = fed + 1, #frames do
+    if i == certain + 1 then
+      bus_module.mark(stream.bus, stream)
+    end
+    if not frames[i].known then
+      feed(stream, frames[i])
+    end
+  end
+  for i = 1, others and #others or 0 do
+    local o = others[i]
+    bus_module.feed(stream.bus, o.slot, o.number, o.raw, o.starts, o.ends, o.side, o.owner)
+  end
+  if #frames > certain then
+    local kept = { count = #frames - certain, order = {} }
+    for i = certain + 1, #frames do
+      kept.order[i - certain] = frames[i].first
+      kept[frames[i].first] = frames[i]
+    end
+    stream.tentative = kept
+  end
+  drop_settled(stream)
+end
+
+local function close(capture, stream)
+  if stream.cutter.buf ~= "" then
+    for i = 1, #stream.packets do
+      stream.packets[i].plan.held = nil
+    end
+    advance(capture, stream, "", true)
+  end
+end
+
+--- One packet, in the order of the capture, once. `raw`: its bytes ("": an event). Returns true when it is one whole
+-- A5 frame and nothing else, whose slot is then `number`; else look at M.plan.
+function M.first(capture, stream, number, time, raw)
+  local length = #raw
+  local cutter = stream.cutter
+  if length == 0 then
+    records.event(cutter)
+    capture.plans[number] = { items = { { kind = "event", at = 0, length = 0 } } }
+    return false
+  end
+  local byte_time = capture.byte_time
+  local ended = stream.ended
+  if ended and time - ended > capture.options.quiet + 1e-6 then
+    close(capture, stream)
+  end
+  local ends = time + length * byte_time
+  stream.ended = ends
+  if length == 13 and cutter.buf == "" then
+    local a, b, c, d, e, f, g, h, i, j, k, l, sum = byte(raw, 1, 13)
+    if
+      a == 0xA5
+      and d == 8
+      and (a + b + c + d + e + f + g + h + i + j + k + l) % 256 == sum
+      and not find(raw, INNER_A5, 2, true)
+      and not find(raw, INNER_MODBUS, 2)
+    then
+      bus_module.feed(stream.bus, number, number, raw, time, ends, stream.side, stream)
+      cutter.base = cutter.base + 13
+      return true
+    end
+  end
+  local first = cutter.base + #cutter.buf
+  local plan = { open = stream }
+  capture.plans[number] = plan
+  stream.packets[#stream.packets + 1] = {
+    number = number,
+    time = time,
+    first = first,
+    last = first + length - 1,
+    plan = plan,
+  }
+  advance(capture, stream, raw, false)
+  return false
+end
+
+--- What a packet shows: its items, those of bytes whose fate is not certain last. nil: one whole frame.
+-- `again`: the capture was read to its end; what is still held is shown as if the stream ended with it.
+function M.plan(capture, number, again)
+  local plan = capture.plans[number]
+  if not plan then
+    return nil
+  end
+  local stream = plan.open
+  if again and stream and not stream.cutter.waiting and stream.peeked ~= stream.cutter.base + #stream.cutter.buf then
+    stream.peeked = stream.cutter.base + #stream.cutter.buf
+    for i = 1, #stream.packets do
+      stream.packets[i].plan.held = nil
+    end
+    settle(capture, stream, records.peek(stream.cutter), "held", stream.cutter.buf, stream.cutter.base)
+  end
+  local items, held = plan.items, plan.held
+  if not held then
+    return items or {}
+  elseif not items then
+    return held
+  end
+  local all = {}
+  for i = 1, #items do
+    all[i] = items[i]
+  end
+  for i = 1, #held do
+    all[#all + 1] = held[i]
+  end
+  return all
+end
+
+return M
