@@ -115,7 +115,7 @@ def versions(environment: Mapping[str, str]) -> tuple[str, str]:
     command = [environment["DALYSHARK_TSHARK"], "--version"]
     text = subprocess.run(command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL).stdout
     wireshark = re.search(r"^TShark \(Wireshark\) ([\d.]*\d)", text)
-    lua = re.search(r"with\s+Lua\s+\(?([\d.]*\d)", text)
+    lua = re.search(r"(?:with\s+|\+)Lua\s+([\d.]*\d)", text)
     return wireshark[1] if wireshark else "?", lua[1] if lua else "none"
 
 
