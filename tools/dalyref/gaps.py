@@ -40,11 +40,10 @@ def _left(data: bytes, at: int, end: int, *, closed: bool) -> tuple[Kind, int] |
 class Gap:
     """The gap that is open at present. All positions count in the buffer that the caller holds."""
 
-    __slots__ = ("_foreign", "_junk", "_piece", "_plain", "_start", "events")
+    __slots__ = ("_events", "_foreign", "_junk", "_piece", "_plain", "_start")
 
     def __init__(self) -> None:
-        self.events: list[int] = []
-        """Where events lie, in order."""
+        self._events: list[int] = []  # where events lie, in order
         self._restart(0)
 
     def _restart(self, start: int) -> None:
@@ -57,13 +56,18 @@ class Gap:
         self._plain = False  # it is known not to be foreign
         self._foreign = foreign.Run()
 
+    def event(self, at: int) -> None:
+        """Note that an event lies at `at`."""
+        if self._events[-1:] != [at]:  # many events at one place are one border
+            self._events.append(at)
+
     def shift(self, count: int) -> None:
         """Drop `count` bytes, all of them in records, from the buffer's left."""
         self._start -= count
         self._junk -= count
         self._piece -= count
-        if self.events:
-            self.events = [event - count for event in self.events if event > count]
+        if self._events:
+            self._events = [event - count for event in self._events if event > count]
 
     def cut(self, data: bytes, start: int, known: int, base: int, out: list[Record], *, closed: bool) -> int:
         """Append what has become certain of the gap that begins at `start` to `out`; return the first byte left over.
@@ -74,7 +78,7 @@ class Gap:
         if self._start != start:
             self._restart(start)
         while True:
-            event = next((event for event in self.events if event > self._piece), None)
+            event = next((event for event in self._events if event > self._piece), None)
             ended = closed
             limit = known
             if event is not None and event <= known:
@@ -124,7 +128,7 @@ class Gap:
         """Write the junk from _start to _junk down, as far as it is complete; `closed`: it ends at _junk."""
         while self._start < self._junk:
             stop = self._start + LONGEST_JUNK
-            event = next((event for event in self.events if event > self._start), stop)
+            event = next((event for event in self._events if event > self._start), stop)
             stop = min(stop, event)
             if stop > self._junk:
                 if not closed:

@@ -8,6 +8,9 @@ from typing import Literal
 
 Direction = Literal["", "inbound", "outbound"]
 
+SERIAL_LINK_TYPES = range(147, 163)
+"""USER0 to USER15: the link types that carry the bytes of a serial line."""
+
 
 @dataclass(frozen=True, slots=True)
 class Packet:

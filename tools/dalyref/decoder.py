@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""From packets to decoded records, in the order of the file (docs/records.md, all of it).
+
+    packets -> streams (cut, time) -> file order -> buses (meaning) -> held until nothing can be added -> out
+
+Memory is bounded whatever the capture holds: see the limits below.
+"""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dalyref.bus import Bus, Slate
+from dalyref.kinds import Dialect, Kind
+from dalyref.options import NANO, Options
+from dalyref.packet import SERIAL_LINK_TYPES
+from dalyref.streams import Located, Stream
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from dalyref.kinds import Record
+    from dalyref.packet import Direction, Packet
+    from dalyref.values import Fields
+
+__all__ = ["Decoded", "Decoder", "Options", "decode"]
+
+# Packets of several interfaces are not strictly in the order of their times. Whether something has been given up by
+# time is therefore decided a little later than the rule would have it.
+_LATE_ON_BUS_NS = NANO // 2
+_LATE_ELSEWHERE_NS = 10 * NANO
+# What a hostile capture may make the decoder hold.
+_MOST_HELD = 65536
+_MOST_WAITING_STREAMS = 64
+_MOST_STREAMS = 4096
+
+_BUS_NAME = re.compile(r"bus=([^\s,;]+)")
+
+
+@dataclass(slots=True, eq=False)
+class Decoded:
+    """One record, decoded. `fields` has the dissector's names (docs/fields.md)."""
+
+    number: int
+    """Of the packet in which the record ends."""
+    time_ns: int
+    """When its first byte began, in ns since 1970 UTC."""
+    kind: Kind
+    data: bytes
+    fields: Fields = field(default_factory=dict)
+    interface: int = 0
+    direction: Direction = ""
+    transport: str = "uart"
+    comment: str = ""
+    """The packet's comment, of an event its text: not from the wire, and not to be trusted."""
+
+
+class Decoder:
+    """Decodes packets as they come. A record comes out when nothing later can change it: after about two seconds."""
+
+    def __init__(self, options: Options | None = None) -> None:
+        self._options = options or Options()
+        self._streams: dict[tuple[int, Direction], Stream] = {}
+        self._waiting: dict[tuple[int, Direction], Stream] = {}  # those that hold bytes
+        self._buses: dict[int | str, Bus] = {}
+        self._bus_of: dict[int, tuple[str, Bus]] = {}  # by interface: its description, its bus
+        self._ordered: list[tuple[int, int, Located]] = []  # heap by packet number and place
+        self._place = 0
+        self._held: deque[tuple[Decoded, Slate | None]] = deque()
+        self._now_ns = 0
+
+    def feed(self, packet: Packet) -> list[Decoded]:
+        """Take the next packet of the file; return the records that are final, in the order of the file.
+
+        Packets of other link types than a serial line's (147 to 162) are passed over.
+        """
+        if packet.link_type not in SERIAL_LINK_TYPES:
+            return []
+        key = (packet.interface, packet.direction)
+        stream = self._streams.get(key)
+        if stream is None:
+            stream = self._new_stream(key)
+        self._order(stream.feed(packet))
+        if not packet.data:
+            self._order((Located(None, packet, packet.time_ns, packet.time_ns),))
+        if stream.waits_from is not None:
+            self._waiting[key] = stream
+        else:
+            self._waiting.pop(key, None)
+        if len(self._waiting) > (key in self._waiting) or len(self._ordered) > _MOST_HELD:
+            self._give_up(key, packet.time_ns)
+        self._release()
+        return self._final()
+
+    def finish(self) -> list[Decoded]:
+        """Take the end of the file; return all that was held."""
+        for stream in self._waiting.values():
+            self._order(stream.flush())
+        self._waiting.clear()
+        self._release()
+        return self._final(everything=True)
+
+    def _new_stream(self, key: tuple[int, Direction]) -> Stream:
+        if len(self._streams) >= _MOST_STREAMS:
+            oldest = next(iter(self._streams))
+            self._waiting.pop(oldest, None)
+            self._order(self._streams.pop(oldest).flush())
+        stream = self._streams[key] = Stream(self._options)
+        return stream
+
+    def _order(self, located: Iterable[Located]) -> None:
+        for item in located:
+            self._place += 1
+            heapq.heappush(self._ordered, (item.packet.number, self._place, item))
+
+    def _give_up(self, present: tuple[int, Direction], time_ns: int) -> None:
+        """Flush streams that have been silent for long, so that they do not hold up the others."""
+        late = [
+            key
+            for key, stream in self._waiting.items()
+            if key != present and stream.silent_at(time_ns, _LATE_ELSEWHERE_NS)
+        ]
+        if len(self._waiting) - len(late) > _MOST_WAITING_STREAMS or len(self._ordered) > _MOST_HELD:
+            late += [key for key in self._waiting if key not in late][:1]
+        for key in late:
+            self._order(self._waiting.pop(key).flush())
+
+    def _release(self) -> None:
+        """Decode what no record still to come can precede."""
+        ordered = self._ordered
+        if not self._waiting:
+            barrier = None
+        else:
+            barrier = min(number for stream in self._waiting.values() if (number := stream.waits_from) is not None)
+        while ordered and (barrier is None or ordered[0][0] <= barrier):
+            self._decode(heapq.heappop(ordered)[2])
+
+    def _bus(self, packet: Packet) -> Bus:
+        known = self._bus_of.get(packet.interface)
+        if known is not None and known[0] == packet.description:
+            return known[1]
+        named = _BUS_NAME.search(packet.description)
+        key = named[1] if named else packet.interface
+        bus = self._buses.get(key)
+        if bus is None:
+            if len(self._buses) >= _MOST_STREAMS:
+                self._buses.clear()
+                self._bus_of.clear()
+            bus = self._buses[key] = Bus(self._options)
+        self._bus_of[packet.interface] = (packet.description, bus)
+        return bus
+
+    def _decode(self, located: Located) -> None:
+        packet, record = located.packet, located.record
+        bus = self._bus(packet)
+        bus.now_ns = max(bus.now_ns, located.start_ns)
+        self._now_ns = max(self._now_ns, located.start_ns)
+        kind, data = (record.kind, record.data) if record is not None else (Kind.EVENT, b"")
+        fields: Fields = {"daly.kind": kind.value, "daly.transport": "uart"}
+        slate: Slate | None = None
+        if record is not None:
+            _describe(record, fields)
+            if kind is Kind.FRAME and record.dialect is Dialect.A5:
+                slate = bus.frame(located, data, fields)
+        decoded = Decoded(
+            packet.number,
+            located.start_ns,
+            kind,
+            data,
+            fields,
+            packet.interface,
+            packet.direction,
+            comment=packet.comment,
+        )
+        self._held.append((decoded, slate))
+
+    def _final(self, *, everything: bool = False) -> list[Decoded]:
+        out: list[Decoded] = []
+        held = self._held
+        while held:
+            decoded, slate = held[0]
+            if slate is not None and slate.open_until_ns:
+                late_ns = slate.open_until_ns
+                if not (
+                    everything
+                    or slate.bus.now_ns > late_ns + _LATE_ON_BUS_NS
+                    or self._now_ns > late_ns + _LATE_ELSEWHERE_NS
+                    or len(held) > _MOST_HELD
+                ):
+                    break
+                slate.bus.settle(slate)
+            out.append(decoded)
+            held.popleft()
+        return out
+
+
+def _describe(record: Record, fields: Fields) -> None:
+    """Add what stands in the record itself."""
+    data, kind = record.data, record.kind
+    if record.dialect is Dialect.A5:
+        fields["daly.dialect"] = "a5"
+        fields["daly.start"] = data[0]
+        fields["daly.address"] = data[1]
+        fields["daly.data_id"] = data[2]
+        fields["daly.length"] = data[3]
+        fields["daly.data"] = data[4:12].hex()
+        fields["daly.checksum"] = data[12]
+        fields["daly.checksum.status"] = 1 if kind is Kind.FRAME else 0
+    elif record.dialect is not None:
+        fields["daly.dialect"] = record.dialect.value
+        fields["daly.modbus.address"] = data[0]
+        fields["daly.modbus.function"] = data[1]
+        fields["daly.modbus.crc"] = int.from_bytes(data[-2:], "little")
+        fields["daly.modbus.crc.status"] = 1
+        fields["daly.undecoded"] = data[2:-2].hex()
+    else:
+        if kind is Kind.FOREIGN:
+            fields["daly.foreign"] = record.foreign
+        fields["daly.undecoded"] = data.hex()
+
+
+def decode(packets: Iterable[Packet], options: Options | None = None) -> Iterator[Decoded]:
+    """Decode a whole capture, record by record, in the order of the file."""
+    decoder = Decoder(options)
+    for packet in packets:
+        yield from decoder.feed(packet)
+    yield from decoder.finish()

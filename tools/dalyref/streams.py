@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""From packets to records that know their packet and their time (docs/records.md, section 1).
+
+packet   |---- 13 ----|--- 7 ---|--------- 19 ---------|        as captured: cut anywhere
+record   |-- frame ---|---- frame ----|-- frame --|junk|        as decoded
+number         1              3            3        3           of the packet in which the record ends
+
+Time decides nothing here but when an incomplete record is given up.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dalyref.records import Splitter
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from dalyref.kinds import Record
+    from dalyref.options import Options
+    from dalyref.packet import Packet
+
+
+@dataclass(slots=True, eq=False)
+class Located:
+    """A record with its place in the file and on the wire. `record` is None for an event."""
+
+    record: Record | None
+    packet: Packet
+    """The packet in which it ends."""
+    start_ns: int
+    """When its first byte began."""
+    end_ns: int
+    """When its last byte had ended."""
+
+
+class Stream:
+    """All bytes of one interface and one direction."""
+
+    __slots__ = ("_chunks", "_end_ns", "_length", "_options", "_quiet_ns", "_splitter")
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self._quiet_ns = options.limit_ns(options.quiet)
+        self._splitter = Splitter()
+        self._chunks: deque[tuple[int, Packet]] = deque()  # (stream offset, packet) that a record may still begin in
+        self._length = 0
+        self._end_ns: int | None = None  # when the last byte had ended
+
+    @property
+    def waits_from(self) -> int | None:
+        """The number of the packet with the first byte that is in no record yet."""
+        return self._chunks[0][1].number if self._splitter.pending else None
+
+    def silent_at(self, time_ns: int, longer_ns: int = 0) -> bool:
+        """Tell whether a packet that begins at `time_ns` comes after silence, by `longer_ns` more than needed."""
+        return self._end_ns is not None and time_ns - self._end_ns > self._quiet_ns + longer_ns
+
+    def feed(self, packet: Packet) -> list[Located]:
+        """Take the next packet of the stream; return the records that are now certain."""
+        out: list[Located] = []
+        if not packet.data:
+            self._splitter.event()
+            return out
+        if self.silent_at(packet.time_ns):
+            out = self.flush()
+        self._chunks.append((self._length, packet))
+        self._length += len(packet.data)
+        self._end_ns = packet.time_ns + self._options.characters_ns(len(packet.data))
+        records = self._splitter.feed(packet.data)
+        if records:
+            out += self._locate(records)
+        return out
+
+    def flush(self) -> list[Located]:
+        """Silence or the end: return what is held."""
+        return self._locate(self._splitter.flush()) if self._splitter.pending else []
+
+    def _locate(self, records: Iterable[Record]) -> list[Located]:
+        chunks = self._chunks
+        time = self._options.characters_ns
+        out: list[Located] = []
+        for record in records:
+            offset, packet = chunks[0]
+            start_ns = packet.time_ns + time(record.start - offset)
+            end = record.start + len(record.data)
+            while offset + len(packet.data) < end:
+                chunks.popleft()
+                offset, packet = chunks[0]
+            out.append(Located(record, packet, start_ns, packet.time_ns + time(end - offset)))
+            if offset + len(packet.data) == end:
+                chunks.popleft()
+        return out
