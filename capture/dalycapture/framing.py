@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dalyref.records import Splitter
 
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 BITS_PER_BYTE: Final = 10  # 8N1: start, eight data, stop
 SILENCE_NS: Final = 250_000_000
+A5_START: Final = 0xA5
+A5_SIZE: Final = 13
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +40,7 @@ class TimedRecord:
     record: Record
 
 
-@dataclass(frozen=True, slots=True)
-class _Read:
+class _Read(NamedTuple):
     """One read: it ended at this offset of the stream, at this time."""
 
     end: int
@@ -54,6 +55,7 @@ class Framer:
 
     def __init__(self, baud: int = 9600, silence_ns: int = SILENCE_NS) -> None:
         self._splitter = Splitter()
+        self._ahead = b""  # not yet shown to the splitter
         self._byte_ns = BITS_PER_BYTE * 1_000_000_000 / baud
         self._silence_ns = silence_ns
         self._reads: deque[_Read] = deque()  # those that carried bytes of records yet to come
@@ -70,15 +72,22 @@ class Framer:
         timed: list[TimedRecord] = []
         if self._reads and self._wire_ns(read_ns, len(data)) > self._reads[-1].time_ns + self._silence_ns:
             timed = self.flush()
-        if data:
-            self._fed += len(data)
-            self._reads.append(_Read(self._fed, read_ns))
-            timed += [self._timed(record) for record in self._splitter.feed(data)]
-        return timed
+        if not data:
+            return timed
+        self._fed += len(data)
+        self._reads.append(_Read(self._fed, read_ns))
+        # A byte a read is what a UART gives. A frame of 13 that has just begun needs no look before it can be whole:
+        # how the bytes are cut into pieces makes no difference to the records.
+        self._ahead += data
+        if self._ahead[0] == A5_START and len(self._ahead) < A5_SIZE and not self._splitter.pending:
+            return timed
+        ahead, self._ahead = self._ahead, b""
+        return timed + [self._timed(record) for record in self._splitter.feed(ahead)]
 
     def flush(self) -> list[TimedRecord]:
         """Close what is incomplete: the bus is quiet, or the capture ends."""
-        return [self._timed(record) for record in self._splitter.flush()]
+        ahead, self._ahead = self._ahead, b""
+        return [self._timed(record) for record in self._splitter.feed(ahead) + self._splitter.flush()]
 
     def _wire_ns(self, read_ns: int, length: int) -> int:
         """When ``length`` bytes began, the last of which had ended at read_ns."""

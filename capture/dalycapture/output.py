@@ -42,6 +42,10 @@ class Output(Protocol):
         """Take a block; False: it had to be dropped, though the output lives. Raises OSError when it is broken."""
         ...
 
+    def pump(self) -> None:
+        """Hand on what waits for a slow reader. Raises OSError."""
+        ...
+
     def close(self) -> None:
         """Close; what could not go out is lost."""
         ...
@@ -73,6 +77,9 @@ class FileOutput:
         self.size += done
         return True
 
+    def pump(self) -> None:
+        """Do nothing: a file takes all at once."""
+
     def close(self) -> None:
         """Close the file."""
         os.close(self._fd)
@@ -86,7 +93,6 @@ class PipeOutput:
         self.size = 0
         self._fd = fd
         self._backlog = bytearray()
-        self.is_pipe = stat.S_ISFIFO(os.fstat(fd).st_mode)
         self._poll = select.poll()
         self._poll.register(fd, select.POLLOUT)
 

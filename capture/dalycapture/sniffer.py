@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import selectors
+import math
 import signal
 import socket
 import time
@@ -27,7 +27,7 @@ from dalycapture.errors import CaptureError, PortError
 from dalycapture.framing import SILENCE_NS, Framer, TimedRecord
 from dalycapture.output import PipeOutput
 from dalycapture.pcapng import CRC_ERROR, TOO_SHORT
-from dalycapture.port import READ_SIZE
+from dalycapture.waiting import Waiter
 from dalyref.kinds import Kind
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ if TYPE_CHECKING:
 
 ERROR_FLAGS: Final = {Kind.BAD_CHECKSUM: CRC_ERROR, Kind.SHORT: TOO_SHORT}
 
-# PollSelector, not epoll: epoll takes no /dev/null. Windows has select alone.
-_Selector: type[selectors.BaseSelector] = getattr(selectors, "PollSelector", selectors.SelectSelector)
+SILENCE_S: Final = SILENCE_NS / 1e9
 
 
 class End(StrEnum):
@@ -113,6 +112,7 @@ class Sniffer:
         self._clock = clock
         self._framer = Framer(interface.speed or 9600)
         self._stop_asked = False
+        self._end: End | None = None
         self._gone: list[CaptureWriter] = []  # pipes whose reader went away
         self._waker, self._wake = socket.socketpair()
         self._waker.setblocking(False)
@@ -133,12 +133,9 @@ class Sniffer:
         with contextlib.ExitStack() as stack:
             stack.callback(self._close)
             stack.enter_context(self._stopped_by(stop_signals))
-            selector = stack.enter_context(_Selector())
             started, start_ns = time.monotonic(), self._clock()
             self._to_all(lambda sink: sink.add_interface(self._interface))
-            selector.register(self._port.fileno(), selectors.EVENT_READ, self._on_port)
-            selector.register(self._waker.fileno(), selectors.EVENT_READ, self._on_wake)
-            self.tally.end = self._listen(selector, started)
+            self.tally.end = self._listen(started)
             self._write(self._framer.flush())
             self.tally.seconds = time.monotonic() - started
             end_ns = self._clock()
@@ -149,31 +146,29 @@ class Sniffer:
             )
         return self.tally
 
-    def _listen(self, selector: selectors.BaseSelector, started: float) -> End:
-        until = None if self._limits.duration is None else started + self._limits.duration
-        quiet_at: float | None = None
-        while True:
-            self._watch_pipes(selector)
-            moments = [moment for moment in (until, quiet_at) if moment is not None]
-            timeout = max(0.0, min(moments) - time.monotonic()) if moments else None
-            heard = [key.data() for key, _ in selector.select(timeout)]
+    def _listen(self, started: float) -> End:
+        port, waker = self._port.fileno(), self._waker.fileno()
+        waiter = Waiter()
+        waiter.watch(port, read=True)
+        waiter.watch(waker, read=True)
+        until = math.inf if self._limits.duration is None else started + self._limits.duration
+        pipes = any(isinstance(sink.output, PipeOutput) for sink in self._sinks)
+        now = heard = started
+        while self._end is None:
+            if pipes:
+                self._watch_pipes(waiter)
+            wake_at = min(until, heard + SILENCE_S) if self._framer.pending else until
+            ready = waiter.wait(None if wake_at == math.inf else wake_at - now)
             now = time.monotonic()
-            if any(heard):
-                quiet_at = now + SILENCE_NS / 1e9 if self._framer.pending else None
-            elif quiet_at is not None and now >= quiet_at:
+            if port in ready:
+                self._on_port()
+                heard = now
+            elif self._framer.pending and now - heard >= SILENCE_S:
                 self._write(self._framer.flush())
-                quiet_at = None
             self.tally.seconds = now - started
-            if limit := self._limit():
-                return limit
-            if self.tally.problem:
-                return End.PORT_LOST
-            if not self._sinks:
-                return End.READER_GONE
-            if self._stop_asked:
-                return End.STOPPED
-            if until is not None and now >= until:
-                return End.DURATION
+            if self._end is None and (self._stop_asked or now >= until):
+                self._end = End.STOPPED if self._stop_asked else End.DURATION
+        return self._end
 
     def _limit(self) -> End | None:
         """Tell which limit, if any, what was written has reached."""
@@ -184,28 +179,22 @@ class Sniffer:
             return End.FILESIZE
         return None
 
-    def _on_port(self) -> bool:
-        """Read once; True if bytes came."""
+    def _on_port(self) -> None:
         try:
             data = self._port.read()
         except PortError as error:
             self._write(self._framer.flush())
             self.tally.problem = str(error)
+            self._end = self._end or End.PORT_LOST
             now_ns = self._clock()
             comment = f"port lost: {error}"
             self._to_all(lambda sink: sink.write_packet(now_ns, b"", comment=comment))
-            return False
-        if not data:
-            return False
-        now_ns = self._clock()
-        self.tally.bytes += len(data)
-        self._write(self._framer.feed(data, now_ns))
-        return True
-
-    def _on_wake(self) -> bool:
-        with contextlib.suppress(BlockingIOError):
-            self._waker.recv(READ_SIZE)
-        return False
+            return
+        if data:
+            now_ns = self._clock()
+            self.tally.bytes += len(data)
+            if records := self._framer.feed(data, now_ns):
+                self._write(records)
 
     def _write(self, records: list[TimedRecord]) -> None:
         """Write records to all sinks, up to a limit: what comes behind it is not part of the capture."""
@@ -220,6 +209,7 @@ class Sniffer:
             self.tally.kinds[timed.record.kind] += 1
             if self._listener:
                 self._listener(timed)
+        self._end = self._end or self._limit()
 
     def _give_up(self, unwritten: int) -> NoReturn:
         """Count all that was heard and is in no file, as a file broke, and say so."""
@@ -245,35 +235,18 @@ class Sniffer:
         self._sinks.remove(sink)
         self._gone.append(sink)
         self.tally.notes.append(note)
+        if not self._sinks:
+            self._end = self._end or End.READER_GONE
 
-    def _watch_pipes(self, selector: selectors.BaseSelector) -> None:
-        """Have the selector tell when a pipe's reader goes away, and when it takes what waits for it."""
-        for sink in (*self._sinks, *self._gone):
-            output = sink.output
-            if not isinstance(output, PipeOutput):
-                continue
-            wanted = 0
-            if sink in self._sinks:
-                wanted = (selectors.EVENT_READ if output.is_pipe else 0) | (
-                    selectors.EVENT_WRITE if output.waiting else 0
-                )
-            known = selector.get_map().get(output.fileno())
-            if known and known.events == wanted:
-                continue
-            if known:
-                selector.unregister(output.fileno())
-            if wanted:
-                selector.register(output.fileno(), wanted, functools.partial(self._on_pipe, sink, output))
-
-    def _on_pipe(self, sink: CaptureWriter, output: PipeOutput) -> bool:
-        try:
-            output.pump()
-        except OSError as error:
-            sink.failure = error
-            if not isinstance(error, BrokenPipeError):
-                raise sink.broken() from error
-            self._let_go(sink, str(sink.broken()))
-        return False
+    def _watch_pipes(self, waiter: Waiter) -> None:
+        """Hand on what waits for slow readers, and be woken when they take more or go away."""
+        for sink in tuple(self._sinks):
+            if isinstance(sink.output, PipeOutput):
+                self._to(sink, lambda sink: sink.hand_on())
+                waiter.watch(sink.output.fileno(), write=sink.output.waiting > 0)
+        for sink in self._gone:
+            if isinstance(sink.output, PipeOutput):
+                waiter.forget(sink.output.fileno())
 
     @contextlib.contextmanager
     def _stopped_by(self, signals: Sequence[signal.Signals]) -> Generator[None]:

@@ -64,6 +64,14 @@ class CaptureWriter(ABC):
             self.failure = error
             raise self.broken() from error
 
+    def hand_on(self) -> None:
+        """Hand on what waits for a slow reader, as far as it takes it. Raises CaptureError when it went away."""
+        try:
+            self.output.pump()
+        except OSError as error:
+            self.failure = error
+            raise self.broken() from error
+
     def broken(self) -> CaptureError:
         """Say what happened to the output, and to the records."""
         if isinstance(self.failure, BrokenPipeError):
