@@ -71,7 +71,7 @@ def _choose(data: bytes, start: int, end: int, *, closed: bool) -> tuple[int, in
         at = start - 1
         while found := heads.ANY.search(data, at + 1, end):
             at = found.start()
-            if at + _SHORTEST >= first_end:  # it could not end earlier
+            if first >= 0 and at + _SHORTEST >= first_end:  # it could not end earlier
                 break
             if at in barred:
                 continue
