@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import pytest
+from tests.tools.dalyref import real
 
 from dalyref import a5
-from tests.tools.dalyref import real
 
 
 @pytest.mark.parametrize("row", real.FRAMES, ids=lambda row: row["id"])

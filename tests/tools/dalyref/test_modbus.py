@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import pytest
+from tests.tools.dalyref import real
 
 from dalyref import modbus
 from dalyref.kinds import Dialect, Kind
 from dalyref.records import split
-from tests.tools.dalyref import real
 
 SINGLE = [row for row in real.ROWS if row["transport"] in {"modbus", "ble"} and row["checksum_ok"]]
 
