@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""``dalyshark check``: the Wireshark dissector against the reference decoder, field by field.
+
+Exit status: 0 no difference, 1 differences, 2 could not run (or not to the end of a file).
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dalytools.comparison import Comparison, compare
+from dalytools.problem import Problem
+from dalytools.progress import progress_bar
+from dalytools.terminal_text import plain
+from dalytools.tshark import Tshark
+
+if TYPE_CHECKING:
+    import argparse
+
+SHOWN = 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.description = (
+        "Read captures twice, with tshark and our dissector and with the reference decoder, which were written apart "
+        "from the same papers, and name every field in which they differ."
+    )
+    parser.epilog = "Exit status: 0 no difference, 1 differences, 2 could not run."
+    parser.add_argument("files", nargs="+", metavar="FILE", help="capture file (pcapng or pcap)")
+    parser.add_argument("-q", "--quiet", action="store_true", help="only what differs and the sum")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare every file; print a line a file, each difference, and the sum."""
+    worst = records = differences = 0
+    with Tshark() as tshark:
+        for name in args.files:
+            try:
+                with progress_bar(f"check {Path(name).name}") as advance:
+                    result = compare(tshark, Path(name), progress=advance)
+            except Problem as problem:
+                print(f"dalyshark check: {problem}", file=sys.stderr)  # noqa: T201
+                worst = 2
+                continue
+            show(name, result, quiet=args.quiet)
+            records += result.records
+            differences += result.found
+            if result.broken:
+                print(f"dalyshark check: {result.broken}; compared what is there", file=sys.stderr)  # noqa: T201
+            worst = max(worst, 2 if result.broken else 1 if result.found else 0)
+        print(sum_up(len(args.files), records, differences, tshark.version))  # noqa: T201
+    return worst
+
+
+def show(name: str, result: Comparison, *, quiet: bool = False) -> None:
+    """Print what came out for one file."""
+    if not quiet or result.found:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(result.kinds.items(), key=lambda item: -item[1]))
+        print(f"{plain(name)}: {result.records} records ({kinds}): {counted(result.found)}")  # noqa: T201
+    for difference in result.differences[:SHOWN]:
+        print(f"  {plain(str(difference))}")  # noqa: T201
+    if result.found > SHOWN:
+        print(f"  and {result.found - SHOWN} more")  # noqa: T201
+
+
+def counted(differences: int) -> str:
+    """Say how many differences."""
+    return "1 difference" if differences == 1 else f"{differences} differences"
+
+
+def sum_up(files: int, records: int, differences: int, version: str) -> str:
+    """Say in a line what was compared."""
+    what = "1 file" if files == 1 else f"{files} files"
+    return f"{what}, {records} records, tshark {version}: {counted(differences)}"

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The dissector's view of a capture and the reference decoder's, side by side.
+
+    tshark -2 -T fields, one row a packet  --+
+                                             +--> differences: packet, field, both values
+    reference decoder, records             --+
+
+Records are compared packet by packet: all values of a field in a packet, in order. Cut-off frames and junk may be divided
+differently by packets and silence (docs/records.md 4): of those, what lies between two other records is put together
+first, and its bytes compared.
+"""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import threading
+from collections import deque
+from dataclasses import dataclass, field
+from typing import IO, TYPE_CHECKING
+
+from dalycapture.errors import CaptureError
+from dalycapture.linktype import DALY_LINK_TYPES, TAKEN_LINK_TYPE, link_type_name
+from dalycapture.reader import read_capture
+from dalyref.decoder import Decoded, Decoder
+from dalytools.field_names import FIELD_NAMES
+from dalytools.problem import Problem
+from dalytools.tshark import Tshark, lua_complaint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from dalyref.packet import Packet
+
+_BETWEEN_FIELDS, _BETWEEN_VALUES = "\t", ";"
+_REST_KINDS = ("junk", "short")
+_UNDECODED = FIELD_NAMES.index("daly.undecoded")
+_KIND = FIELD_NAMES.index("daly.kind")
+_TRANSPORT = FIELD_NAMES.index("daly.transport")
+_DIALECT = FIELD_NAMES.index("daly.dialect")
+_LUA_ERROR = "_ws.lua.error"
+_TIMES = frozenset({"daly.response_time"})
+_TIME_TOLERANCE_S = 2e-6  # the dissector calculates in floating point from the start of the capture
+_MOST_SHOWN = 1000
+_MOST_REST = 1 << 20
+
+Key = tuple[int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One field of one packet that the two readings see differently. packet: as Wireshark counts, 0: the whole file."""
+
+    packet: int
+    field: str
+    dissector: str
+    reference: str
+
+    def __str__(self) -> str:
+        return f"packet {self.packet}  {self.field}: dissector {self.dissector}, reference {self.reference}"
+
+
+@dataclass(slots=True)
+class Comparison:
+    """What came out. ``differences`` holds the first thousand; ``found`` counts all."""
+
+    records: int = 0
+    packets: int = 0
+    kinds: dict[str, int] = field(default_factory=dict[str, int])
+    found: int = 0
+    differences: list[Difference] = field(default_factory=list[Difference])
+    broken: str = ""
+    """One line, when the capture could be read only in part."""
+
+    def add(self, difference: Difference) -> None:
+        """Note a difference."""
+        self.found += 1
+        if len(self.differences) < _MOST_SHOWN:
+            self.differences.append(difference)
+
+
+@dataclass(slots=True)
+class _Rest:
+    """Cut-off frames and junk of one stream as one reading sees them, in pieces between other records."""
+
+    pieces: deque[tuple[int, str]] = field(default_factory=deque[tuple[int, str]])
+    open: str = ""
+
+    def close(self, number: int) -> None:
+        self.pieces.append((number, self.open))
+        self.open = ""
+
+
+def compare(
+    tshark: Tshark, path: Path, *, progress: Callable[[int], None] | None = None, two_pass: bool = True
+) -> Comparison:
+    """Compare both readings of a capture file.
+
+    progress: called now and then with the number of packets compared. Raises Problem when the file cannot be read at all,
+    or has no packet of a link type of ours. A file that is cut off is compared as far as it goes (``broken`` tells).
+    """
+    result = Comparison()
+    link_types = _link_types(path, result)
+    wanted = ",".join(str(number) for number in sorted(link_types))
+    arguments = ["-2"] if two_pass else []
+    arguments += ["-o", f"daly.link_types:{wanted}", "-r", str(tshark.readable(path)), "-T", "fields"]
+    arguments += ["-E", "separator=/t", "-E", f"aggregator={_BETWEEN_VALUES}", "-E", "quote=n", "-e", "frame.number"]
+    for name in (_LUA_ERROR, *FIELD_NAMES):
+        arguments += ["-e", name]
+    process = tshark.start(
+        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None  # noqa: S101 - asked for above
+    assert process.stderr is not None  # noqa: S101 - asked for above
+    messages: list[bytes] = []
+    reader = threading.Thread(target=_drain, args=(process.stderr, messages), daemon=True)
+    reader.start()
+    try:
+        _walk(process.stdout, path, result, progress)
+    finally:
+        process.stdout.close()
+        process.kill() if process.poll() is None and result.broken == "stopped" else None
+        process.wait()
+        reader.join()
+    complaint = lua_complaint(b"".join(messages).decode(errors="replace"))
+    if complaint:
+        result.add(Difference(0, _LUA_ERROR, complaint, "none"))
+    return result
+
+
+def _drain(stream: IO[bytes], into: list[bytes]) -> None:
+    kept = 0
+    while chunk := stream.read(65536):
+        if kept < 1 << 20:
+            into.append(chunk)
+            kept += len(chunk)
+
+
+def _link_types(path: Path, result: Comparison) -> set[int]:
+    """Return the link types of ours in the file, looking at all of it, and whether it reads to its end."""
+    ours: set[int] = set()
+    others: set[int] = set()
+    packets = 0
+    try:
+        for packet in read_capture(path):
+            packets += 1
+            (ours if packet.link_type in DALY_LINK_TYPES else others).add(packet.link_type)
+    except CaptureError as error:
+        if not packets:
+            raise Problem(str(error)) from None
+        result.broken = str(error)
+    if not packets:
+        raise Problem(f"{path}: the capture holds no packet")
+    if not ours:
+        names = ", ".join(link_type_name(number) for number in sorted(others))
+        raise Problem(f"{path}: its link type is {names}; a Daly bus is captured as 147 (USER0) to 162 (USER15)")
+    return ours - {TAKEN_LINK_TYPE} or {147}
+
+
+def _packets(path: Path) -> Iterator[Packet]:
+    try:
+        yield from read_capture(path)
+    except CaptureError:
+        return  # said before, by _link_types
+
+
+def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[int], None] | None) -> None:
+    """Go through both readings together, packet by packet."""
+    decoder = Decoder()
+    ready: deque[Decoded] = deque()
+    packets = _packets(path)
+    streams: dict[int, Key] = {}  # of packets not yet compared
+    sides: dict[Key, tuple[_Rest, _Rest]] = {}
+    ended = False
+    last_seen = 0
+    expected = deque[int]()
+    for row in rows:
+        values = row.decode("utf-8", errors="replace").rstrip("\r\n").split(_BETWEEN_FIELDS)
+        number = int(values[0])
+        # Feed the reference until all its records of this packet are final.
+        while not ended and not (ready and ready[-1].number > number):
+            packet = next(packets, None)
+            if packet is None:
+                ready.extend(decoder.finish())
+                ended = True
+                break
+            if packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE:
+                streams[packet.number] = (packet.interface, packet.direction)
+                expected.append(packet.number)
+                ready.extend(decoder.feed(packet))
+        mine: list[Decoded] = []
+        while ready and ready[0].number <= number:
+            mine.append(ready.popleft())
+        result.packets += 1
+        result.records += len(mine)
+        key = streams.pop(number, None)
+        while expected and expected[0] <= number:
+            if expected[0] < number:
+                result.add(Difference(expected[0], "packet", "not shown", "present"))
+            expected.popleft()
+        if key is not None:
+            _packet(number, values[1:], mine, sides.setdefault(key, (_Rest(), _Rest())), result)
+        last_seen = number
+        if progress and number % 4096 == 0:
+            progress(number)
+    while not ended:
+        packet = next(packets, None)
+        if packet is None:
+            ready.extend(decoder.finish())
+            ended = True
+        elif packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE:
+            ready.extend(decoder.feed(packet))
+    if ready:
+        result.add(
+            Difference(ready[0].number, "packet", f"nothing after packet {last_seen}", f"{len(ready)} more records")
+        )
+    for dissector, reference in sides.values():
+        dissector.close(last_seen)
+        reference.close(last_seen)
+        _compare_rest(dissector, reference, result)
+
+
+def _packet(
+    number: int, values: list[str], mine: list[Decoded], rest: tuple[_Rest, _Rest], result: Comparison
+) -> None:
+    """Compare all records that end in one packet."""
+    if values[0]:
+        result.add(Difference(number, _LUA_ERROR, values[0], "none"))
+    seen = [value.split(_BETWEEN_VALUES) if value else [] for value in values[1:]]
+    if len(seen) != len(FIELD_NAMES):
+        result.add(Difference(number, "row", f"{len(seen)} fields", f"{len(FIELD_NAMES)} fields"))
+        return
+    _set_aside(number, seen, rest[0])
+    told: dict[str, list[object]] = {}
+    for record in mine:
+        result.kinds[record.kind] = result.kinds.get(record.kind, 0) + 1
+        if record.kind in _REST_KINDS:
+            rest[1].open += record.data.hex()
+            continue
+        if record.kind != "event":
+            rest[1].close(number)
+        for name, value in record.fields.items():
+            told.setdefault(name, []).extend(value if isinstance(value, list) else [value])
+    _compare_rest(*rest, result)
+    if any(len(side.open) > _MOST_REST for side in rest):
+        _compare_open(number, rest, result)
+    for name in told.keys() - _KNOWN:
+        result.add(Difference(number, name, "not a field of the dissector", str(told[name])))
+    for name, values_seen in zip(FIELD_NAMES, seen, strict=True):
+        expected = told.get(name, [])
+        if len(values_seen) != len(expected) or not all(
+            _same(name, one, other) for one, other in zip(values_seen, expected, strict=True)
+        ):
+            result.add(
+                Difference(
+                    number,
+                    name,
+                    ", ".join(values_seen) or "absent",
+                    ", ".join(map(_shown, expected)) or "absent",
+                )
+            )
+
+
+_KNOWN = frozenset(FIELD_NAMES)
+
+
+def _set_aside(number: int, seen: list[list[str]], rest: _Rest) -> None:
+    """Take cut-off frames and junk out of the dissector's row, into ``rest``."""
+    kinds, undecoded, dialects = seen[_KIND], deque(seen[_UNDECODED]), deque(seen[_DIALECT])
+    kept: list[str] = []
+    kept_undecoded: list[str] = []
+    for kind in kinds:
+        if kind in _REST_KINDS:
+            rest.open += undecoded.popleft().replace(":", "") if undecoded else ""
+            continue
+        kept.append(kind)
+        if kind != "event":
+            rest.close(number)
+        dialect = dialects.popleft() if kind in ("frame", "bad_checksum") and dialects else ""
+        if (kind == "foreign" or (kind == "frame" and dialect != "a5")) and undecoded:
+            kept_undecoded.append(undecoded.popleft())
+    seen[_TRANSPORT] = seen[_TRANSPORT][: len(kept)] if len(kept) < len(kinds) else seen[_TRANSPORT]
+    seen[_KIND], seen[_UNDECODED] = kept, kept_undecoded + list(undecoded)
+
+
+def _compare_rest(dissector: _Rest, reference: _Rest, result: Comparison) -> None:
+    while dissector.pieces and reference.pieces:
+        number, theirs = dissector.pieces.popleft()
+        _, ours = reference.pieces.popleft()
+        if theirs != ours:
+            result.add(Difference(number, "bytes before", theirs or "none", ours or "none"))
+
+
+def _compare_open(number: int, rest: tuple[_Rest, _Rest], result: Comparison) -> None:
+    """Compare what both have of a long stretch of junk, so that it need not be kept."""
+    dissector, reference = rest
+    both = min(len(dissector.open), len(reference.open))
+    if dissector.open[:both] != reference.open[:both]:
+        result.add(Difference(number, "bytes before", "differ", "differ"))
+    dissector.open, reference.open = dissector.open[both:], reference.open[both:]
+
+
+def _shown(value: object) -> str:
+    return str(int(value)) if isinstance(value, bool) else str(value)
+
+
+def _same(name: str, seen: str, told: object) -> bool:
+    """Tell whether tshark's text means the reference's value. Booleans print as 1 or True, by version."""
+    if isinstance(told, bool):
+        return seen in (("1", "True") if told else ("0", "False"))
+    if isinstance(told, int):
+        try:
+            return int(seen, 0) == told
+        except ValueError:
+            return False
+    if isinstance(told, float):
+        try:
+            value = float(seen)
+        except ValueError:
+            return False
+        if name in _TIMES:
+            return abs(value - told) <= _TIME_TOLERANCE_S
+        return math.isclose(value, told, rel_tol=1e-12, abs_tol=1e-12)
+    return seen.replace(":", "") == told if name in _BYTES else seen == told
+
+
+_BYTES = frozenset({"daly.data", "daly.reserved", "daly.undecoded"})

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Start the real tshark with our dissector, so that it surely loads and nothing of the user's gets in its way.
+
+Three traps stand behind this file:
+
+- from 4.2 on, a tshark that runs as root ignores Lua plugins without a word: as root we start it as an ordinary user,
+  with the dissector (and, where needed, the capture) in a folder that this user can read;
+- tshark's exit status says nothing about Lua: its messages are read for ``Lua:``, and a first run on two known packets
+  proves that the dissector is there;
+- a copy of the dissector in the user's plugin folder, or preferences, would change what is compared: HOME and Wireshark's
+  folders point to an empty folder.
+
+``DALYSHARK_TSHARK`` names another tshark than the one on the PATH.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import struct
+import subprocess
+import tempfile
+from importlib import resources
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Self
+
+from dalytools.problem import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+
+ORDINARY_USER = 65534  # nobody
+
+_PLACES = (  # where installers put it without telling the PATH
+    r"C:\Program Files\Wireshark\tshark.exe",
+    "/Applications/Wireshark.app/Contents/MacOS/tshark",
+)
+
+_MISSING = (
+    "tshark, Wireshark's terminal program, is not installed; "
+    "on Debian and Ubuntu: sudo apt install tshark (others: wireshark.org)"
+)
+
+# A request and its reply, as a classic pcap of link type 147: what the dissector must know.
+_PROOF = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 147) + b"".join(
+    struct.pack("<IIII", 0, 0, 13, 13) + bytes.fromhex(frame)
+    for frame in ("a540900800000000000000007d", "a501900802100000753001f4ea")
+)
+
+
+def dissector_folder() -> Path:
+    """Return the folder with daly.lua: inside an installed package, else the repository's."""
+    packaged = Path(str(resources.files("dalytools"))) / "dissector"
+    if packaged.is_dir():
+        return packaged
+    return Path(__file__).resolve().parents[2] / "dissector"
+
+
+def find_tshark() -> str:
+    """Return the path of tshark. Raises Problem when there is none."""
+    asked = os.environ.get("DALYSHARK_TSHARK")
+    if asked:
+        if not os.access(asked, os.X_OK):
+            raise Problem(f"DALYSHARK_TSHARK is {asked}, which is not a program")
+        return asked
+    found = shutil.which("tshark") or next((place for place in _PLACES if Path(place).exists()), None)
+    if found is None:
+        raise Problem(_MISSING)
+    return found
+
+
+class Tshark:
+    """A tshark with our dissector. Use as a context manager: it keeps a temporary folder.
+
+    version: as tshark says it, for example ``"4.0.17"``. Raises Problem when there is no tshark or the dissector does
+    not load in it.
+    """
+
+    def __init__(self) -> None:
+        self._program = find_tshark()
+        self._as_root = hasattr(os, "geteuid") and os.geteuid() == 0
+        self._folder = tempfile.TemporaryDirectory(prefix="dalyshark-", ignore_cleanup_errors=True)
+        self._home = Path(self._folder.name)
+        self.version = ""
+
+    def __enter__(self) -> Self:
+        try:
+            self._prepare()
+        except BaseException:
+            self._folder.cleanup()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._folder.cleanup()
+
+    @property
+    def home(self) -> Path:
+        """The temporary folder, which the tshark that is started can read and write."""
+        return self._home
+
+    def readable(self, path: Path) -> Path:
+        """Return a path of this file that the tshark which is started can read: a copy where it must be."""
+        if not self._as_root or _anyone_reads(path):
+            return path
+        copy = self._home / f"{len(list(self._home.iterdir()))}-{path.name}"
+        try:
+            shutil.copyfile(path, copy)
+        except OSError as error:
+            raise Problem(f"{path}: cannot be read: {error.strerror}") from None
+        copy.chmod(0o644)
+        return copy
+
+    def command(self, *arguments: str) -> list[str]:
+        """Return the words of a tshark call with our dissector: no name look-ups, the given arguments behind."""
+        return [self._program, "-n", "-X", f"lua_script:{self._lua}", *arguments]
+
+    def start(self, arguments: Sequence[str], **streams: Any) -> subprocess.Popen[bytes]:
+        """Start tshark with these arguments; streams: stdin, stdout, stderr and the like, as for Popen."""
+        return subprocess.Popen(self.command(*arguments), **self._surroundings(), **streams)
+
+    def run(self, *arguments: str, stdin: IO[bytes] | None = None) -> subprocess.CompletedProcess[bytes]:
+        """Run tshark to its end; its output and messages are in the result."""
+        return subprocess.run(
+            self.command(*arguments),
+            stdin=stdin or subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            **self._surroundings(),
+        )
+
+    @property
+    def _lua(self) -> Path:
+        return self._home / "lua" / "daly.lua"
+
+    def _prepare(self) -> None:
+        source = dissector_folder()
+        if not (source / "daly.lua").is_file():
+            raise Problem(f"the dissector is not where it should be: {source}; install dalyshark again")
+        lua = self._home / "lua"
+        lua.mkdir()
+        for file in source.glob("*.lua"):
+            shutil.copyfile(file, lua / file.name)
+            (lua / file.name).chmod(0o644)
+        proof = self._home / "proof.pcap"
+        proof.write_bytes(_PROOF)
+        for folder in (self._home, lua):
+            folder.chmod(0o755)
+        if self._as_root:
+            os.chown(self._home, ORDINARY_USER, ORDINARY_USER)
+        proof.chmod(0o644)
+        self._prove(proof)
+
+    def _prove(self, proof: Path) -> None:
+        try:
+            first = self.run("-r", str(proof), "-T", "fields", "-e", "daly.kind", "-e", "daly.soc")
+            version = subprocess.run(
+                [self._program, "--version"], capture_output=True, check=False, **self._surroundings()
+            )
+        except OSError as error:
+            raise Problem(f"tshark does not start: {error.strerror}") from None
+        self.version = _version(version.stdout.decode(errors="replace"))
+        if first.stdout.split() == [b"frame", b"frame", b"50"]:
+            return
+        messages = first.stderr.decode(errors="replace")
+        why = next((line for line in messages.splitlines() if "Lua" in line or "daly" in line), messages.strip())
+        raise Problem(
+            f"tshark {self.version} does not load our dissector: {why or 'it ignores Lua scripts'}; "
+            "is it built with Lua (tshark --version tells)?"
+        )
+
+    def _surroundings(self) -> dict[str, Any]:
+        home = str(self._home)
+        environment = {
+            **{name: value for name, value in os.environ.items() if not name.startswith(("WIRESHARK_", "XDG_"))},
+            **{name: value for name, value in os.environ.items() if name == "WIRESHARK_DATA_DIR"},
+            "HOME": home,
+            "WIRESHARK_CONFIG_DIR": home,
+            "XDG_CONFIG_HOME": home,
+            "APPDATA": home,
+            "LC_ALL": "C.UTF-8",
+        }
+        surroundings: dict[str, Any] = {"env": environment}
+        if self._as_root:
+            surroundings |= {"user": ORDINARY_USER, "group": ORDINARY_USER, "extra_groups": ()}
+        return surroundings
+
+
+def _version(text: str) -> str:
+    for word in text.split():
+        if word[:1].isdigit() and "." in word:
+            return word.rstrip(".")
+    return "of unknown version"
+
+
+def _anyone_reads(path: Path) -> bool:
+    """Tell whether every user may read this file: its own bits and those of all folders above it."""
+    try:
+        path = path.resolve()
+        above = all(folder.stat().st_mode & stat.S_IXOTH for folder in path.parents)
+        return above and bool(path.stat().st_mode & stat.S_IROTH)
+    except OSError:
+        return False
+
+
+def lua_complaint(messages: str) -> str | None:
+    """Return what tshark says about an error in our Lua, or None."""
+    return next((line for line in messages.splitlines() if "Lua:" in line or "Lua Error" in line), None)
