@@ -291,7 +291,7 @@ SAMPLES = (
         "events between records: the port lost and back, a mark set by the user",
         {"frame": 50, "event": 3},
         lambda: polled(one_board(16, 2), 20),
-        marks={25: ("port lost", "port back"), 40: ("mark: charger plugged in",)},
+        marks={25: ("port lost", "port back"), 42: ("mark: charger plugged in",)},
     ),
     Sample(
         "made-link-type-151.pcapng",
