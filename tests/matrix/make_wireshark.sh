@@ -16,6 +16,7 @@
 # Lua: from 4.2 on Wireshark loads no script for root, and says nothing. So for root a program runs in a user namespace
 # of its own where root is an ordinary user (its files stay its own there), or as nobody where that is forbidden.
 set -eu
+umask 022 # root's tests start these programs as nobody
 
 die() {
     echo "make_wireshark: $*" >&2

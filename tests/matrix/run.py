@@ -12,11 +12,14 @@ Prints a table, a line a member. A member that could not be had (no Debian mirro
 Exit status 0: all members that could be had passed; 1: one failed, or none could be had; 2: the command line is wrong.
 """
 
+import atexit
 import os
 import re
 import shutil
+import stat
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,7 +110,18 @@ def programs(member: str) -> dict[str, str]:
         status, text = run(f"{member}-fetch", [ROOT / "tests" / "matrix" / "make_wireshark.sh", member, folder], {})
         if status:
             raise NotHadError(text.strip().removeprefix("make_wireshark: "))
+    folder = reachable(folder)
     return {"DALYSHARK_TSHARK": str(folder / "tshark"), "DALYSHARK_SHARKD": str(folder / "sharkd")}
+
+
+def reachable(folder: Path) -> Path:
+    """Return the folder, or for root a copy where its own is closed to others: root's tests start tshark as nobody."""
+    if os.geteuid() != 0 or all(above.stat().st_mode & stat.S_IXOTH for above in folder.parents):
+        return folder
+    place = Path(tempfile.mkdtemp(prefix="dalyshark-matrix-"))
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    place.chmod(0o755)
+    return Path(shutil.copytree(folder, place / folder.name, symlinks=True))
 
 
 def versions(environment: Mapping[str, str]) -> tuple[str, str]:

@@ -8,11 +8,11 @@ agree.
 """
 
 import json
-import os
 import re
 import struct
 import subprocess
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,10 +20,10 @@ from typing import Any
 
 import pytest
 
+from dalytools.tshark import Tshark, lua_complaint
+
 ROOT = Path(__file__).resolve().parents[2]
-DISSECTOR = ROOT / "dissector"
 SAMPLES = sorted(path for path in (ROOT / "pcap_samples").iterdir() if path.suffix in {".pcap", ".pcapng"})
-TSHARK = os.environ.get("DALYSHARK_TSHARK", "tshark")
 
 Value = str | float | None
 Item = tuple[str, Value]
@@ -51,10 +51,10 @@ def plain(text: str | None) -> Value:
 
 
 def literal(text: str | None) -> Value:
-    """A display filter's literal as a value: its strings are quoted, with a backslash before quotes and backslashes."""
+    """A display filter's literal as a value: strings stand in quotes, with backslashes; one byte alone is `20:`."""
     if text is not None and text.startswith('"'):
         return plain(re.sub(r"\\(.)", r"\1", text[1:-1]))
-    return plain(text)
+    return plain(text.removesuffix(":") if text else text)
 
 
 def node(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -81,25 +81,26 @@ def wiregasm_views() -> dict[str, list[Packet]]:
     return views
 
 
-def tshark(capture: Path, home: Path, *arguments: str) -> str:
-    """Run tshark with the dissector, as somebody who is not root: for root, Wireshark from 4.2 on loads no Lua."""
-    ordinary = ["unshare", "--user", "--map-user=1000", "--map-group=1000"] if os.getuid() == 0 else []
-    script = f"lua_script:{DISSECTOR / 'daly.lua'}"
-    command = [*ordinary, TSHARK, "-n", "-2", "-X", script, "-r", str(capture), *arguments]
-    environment = {**os.environ, "HOME": str(home), "TZ": "UTC", "LC_ALL": "C.UTF-8"}
-    run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    assert "Lua" not in run.stderr, run.stderr
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+@pytest.fixture(scope="module")
+def tshark() -> Iterator[Tshark]:
+    with Tshark() as program:
+        yield program
 
 
-def tshark_view(capture: Path, home: Path) -> list[Packet]:
+def output(tshark: Tshark, capture: Path, *arguments: str) -> str:
+    run = tshark.run("-2", "-r", str(tshark.readable(capture)), *arguments)
+    messages = run.stderr.decode(errors="replace")
+    assert lua_complaint(messages) is None
+    assert run.returncode == 0, messages
+    return run.stdout.decode()
+
+
+def tshark_view(tshark: Tshark, capture: Path) -> list[Packet]:
     # The columns' names were capitals up to 4.2; either version leaves the other's empty.
     columns = ("_ws.col.Protocol", "_ws.col.protocol", "_ws.col.Info", "_ws.col.info")
-    table = tshark(capture, home, "-T", "fields", *(part for column in columns for part in ("-e", column)))
+    table = output(tshark, capture, "-T", "fields", *(part for column in columns for part in ("-e", column)))
     rows = [row.split("\t") for row in table.removesuffix("\n").split("\n")]
-    trees = ET.fromstring(tshark(capture, home, "-T", "pdml")).findall("packet")
-    assert len(rows) == len(trees)
+    trees = ET.fromstring(output(tshark, capture, "-T", "pdml")).findall("packet")
     return [
         Packet(
             row[0] or row[1],
@@ -119,8 +120,8 @@ def test_there_are_samples() -> None:
 
 
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda sample: sample.name)
-def test_same_packets_columns_and_items(sample: Path, tmp_path: Path) -> None:
-    theirs, ours = wiregasm_views()[sample.name], tshark_view(sample, tmp_path)
+def test_same_packets_columns_and_items(tshark: Tshark, sample: Path) -> None:
+    theirs, ours = wiregasm_views()[sample.name], tshark_view(tshark, sample)
     assert len(theirs) == len(ours)
     for number, (their, our) in enumerate(zip(theirs, ours, strict=True), start=1):
         assert their == our, f"packet {number}"
