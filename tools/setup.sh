@@ -41,7 +41,7 @@ find_python() {
         echo "$venv/bin/python"
         return
     fi
-    for candidate in ${PYTHON:-} python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
+    for candidate in ${PYTHON:-} python3 python3.14 python3.13 python3.12 python3.11; do
         if have "$candidate" && recent_enough "$candidate"; then
             command -v "$candidate"
             return
