@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 _GROUP_S = 0.004  # bytes are handed over in groups of about this length, as adapters do
 _HALF_FRAME_NS = 30_000_000  # how long the rest of a client's frame may take to come
 _CLIENT_FIRST_NS = 150_000_000  # the host leaves the bus to a client for so long after an answer
+_MOST_AT_ONCE = 256  # bytes of a client's that is no frame; a stop or the host need not wait for more
 _BEHIND_NS = 1_000_000_000  # further behind than this (machine asleep, stopped): forget it, do not catch up
 
 
@@ -204,6 +205,7 @@ class SimulatedBus:
             waiting = self._now() - self._inbox_ns < _HALF_FRAME_NS
             beginning = inbox.find(START, max(0, len(inbox) - whole + 1))
             size = beginning if waiting and beginning >= 0 else len(inbox)
+        size = min(size, _MOST_AT_ONCE)
         self._inbox = inbox[size:]
         return inbox[:size]
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 LINK_TYPES = range(147, 163)  # USER0..USER15: raw bytes of a bus
 REPLAY = "replay"
+_PIECE = 256  # bytes
 
 
 def open_replay(path: Path, *, baud: int, speed: float = 1.0, longest_silence_s: float = 2.0) -> Iterator[Sent]:
@@ -53,6 +54,8 @@ def replay(packets: Iterable[Packet], *, baud: int, speed: float, longest_silenc
         length_ns = len(packet.data) * BITS_A_BYTE * 1_000_000_000 // baud
         silence = 0 if heard_until is None else min(max(0, packet.time_ns - heard_until), longest_ns)
         start = free_ns + int(silence / speed)
-        yield Sent(start, REPLAY, packet.data)
+        for at in range(0, len(packet.data), _PIECE):  # whoever plays it can stop inside a packet of any size
+            time_ns = start + int(at * BITS_A_BYTE * 1_000_000_000 / baud / speed)
+            yield Sent(time_ns, REPLAY, packet.data[at : at + _PIECE])
         free_ns = start + int(length_ns / speed)
         heard_until = packet.time_ns + length_ns

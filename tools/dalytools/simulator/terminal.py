@@ -87,8 +87,7 @@ class Terminal:
                 self._open()
             return
         with contextlib.suppress(OSError):
-            tty.setraw(peer)
-            termios.tcflush(peer, termios.TCIFLUSH)  # not what it wrote: that is still to be read
+            tty.setraw(peer, termios.TCSAFLUSH)  # flushes what was sent to it, not what it wrote
         os.close(peer)
 
     def send(self, data: bytes) -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from importlib.metadata import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -22,7 +23,7 @@ from dalytools.simulator.scenario import Board, Habits, Host, Pack, Phase, Scena
 if TYPE_CHECKING:
     from types import TracebackType
 
-CLIENT = Path(sys.executable).with_name("daly-bms-cli")
+CLIENT = next(path.locate() for path in files("dalybms") or () if path.name == "daly-bms-cli")
 SAMPLE = Path(__file__).parents[4] / "pcap_samples/real-poll-cycle.pcapng"
 REQUEST_98 = bytes.fromhex("a5409808000000000000000085")  # tano-req-98
 QUICK = Habits(reply_ms=1.0, jitter_ms=0.0)
@@ -73,7 +74,9 @@ def frozen(cells: int = 16, sensors: int = 2, **board: object) -> Scenario:
 
 
 def dalybms(port: str, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([CLIENT, "-d", port, *words], capture_output=True, text=True, timeout=30, check=False)
+    return subprocess.run(
+        [sys.executable, str(CLIENT), "-d", port, *words], capture_output=True, text=True, timeout=30, check=False
+    )
 
 
 def frames(data: bytes) -> list[bytes]:

@@ -44,6 +44,14 @@ def test_faster() -> None:
     assert played((0.0, b"a"), (1.0, b"b"), (2.0, b"c"), speed=4) == [(0.0, b"a"), (0.25, b"b"), (0.5, b"c")]
 
 
+def test_a_huge_packet_comes_in_pieces() -> None:
+    """1000 bytes at 1000 baud: a piece every 2.56 s, and what follows it begins after 10 s."""
+    whole = bytes(range(250)) * 4
+    out = played((0.0, whole), (10.0, b"next"))
+    assert b"".join(data for _, data in out) == whole + b"next"
+    assert [seconds for seconds, _ in out] == [0.0, 2.56, 5.12, 7.68, 10.0]
+
+
 def test_overlapping_and_backward_times_follow_each_other() -> None:
     assert played((5.0, b"abc"), (5.01, b"d"), (1.0, b"e")) == [(0.0, b"abc"), (0.03, b"d"), (0.04, b"e")]
 

@@ -81,8 +81,10 @@ def test_what_a_listener_writes_is_received_even_when_it_has_left() -> None:
     with terminal() as port:
         assert port.received() == b""
         fd = opened(port.path)
+        assert port.listened()
         os.write(fd, b"\x04\x0a\xa5")
         os.close(fd)
+        assert not port.listened()
         assert port.received() == b"\x04\x0a\xa5"
         assert port.received() == b""
 
