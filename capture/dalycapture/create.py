@@ -21,14 +21,11 @@ def open_writer(
 ) -> CaptureWriter:
     """Make a capture file; ``-`` is standard output. An older capture of that name is overwritten, nothing else is.
 
+    Its header is written with the first interface.
     application: name and version of the program, for the file. Raises CaptureError.
     """
     output = open_output(path)
-    try:
-        if file_format == "pcap":
-            return PcapWriter(output)
-        system = f"{platform.system()} {platform.release()}"
-        return PcapngWriter(output, application=application, hardware=platform.machine(), os_name=system)
-    except BaseException:
-        output.close()
-        raise
+    if file_format == "pcap":
+        return PcapWriter(output)
+    system = f"{platform.system()} {platform.release()}"
+    return PcapngWriter(output, application=application, hardware=platform.machine(), os_name=system)

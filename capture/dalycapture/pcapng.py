@@ -112,10 +112,12 @@ class PcapngWriter(CaptureWriter):
         super().__init__(output)
         self._interfaces = 0
         options = _options(_text(SHB_HARDWARE, hardware), _text(SHB_OS, os_name), _text(SHB_APPLICATION, application))
-        self._write(_block(SECTION_HEADER, _SECTION.pack(BYTE_ORDER_MAGIC, 1, 0, -1) + options))
+        self._header = _block(SECTION_HEADER, _SECTION.pack(BYTE_ORDER_MAGIC, 1, 0, -1) + options)
 
     def add_interface(self, interface: Interface) -> int:
-        """Write an Interface Description Block; the interface's number, from 0."""
+        """Write an Interface Description Block, the first behind the section's header; its number, from 0."""
+        if self._interfaces == 0:
+            self._write(self._header)
         options = _options(
             _text(IF_NAME, interface.name),
             _text(IF_DESCRIPTION, interface.description),

@@ -221,14 +221,24 @@ def _busy(name: str) -> str:
 
 
 def _holder(name: str) -> str:
-    """Find another process that has the device open, as far as /proc tells: ``screen (process 123)``."""
+    """Find who has the device locked, else who has it open, as far as /proc tells: ``screen (process 123)``."""
     device = os.path.realpath(name)
+    lockers: list[str] = []
+    others: list[str] = []
+    with contextlib.suppress(OSError):
+        inode = Path(device).stat().st_ino
+        # 1: FLOCK  ADVISORY  WRITE 14516 00:18:3 0 EOF
+        for words in map(str.split, Path("/proc/locks").read_text(encoding="ascii").splitlines()):
+            if len(words) > 5 and words[1] == "FLOCK" and words[5].endswith(f":{inode}"):
+                lockers.append(words[4])
     for process in Path("/proc").glob("[0-9]*"):
-        if int(process.name) == os.getpid():
-            continue
         with contextlib.suppress(OSError):
             if any(os.path.realpath(link) == device for link in (process / "fd").iterdir()):
-                return f"{(process / 'comm').read_text().strip()} (process {process.name})"
+                others.append(process.name)
+    for pid in [pid for pid in others if pid in lockers] + others:
+        with contextlib.suppress(OSError):
+            if int(pid) != os.getpid():
+                return f"{(Path('/proc') / pid / 'comm').read_text().strip()} (process {pid})"
     return ""
 
 

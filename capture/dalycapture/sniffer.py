@@ -200,7 +200,7 @@ class Sniffer:
         """Write records to all sinks, up to a limit: what comes behind it is not part of the capture."""
         for index, timed in enumerate(records):
             if self._limit():
-                return
+                break
             try:
                 self._to_all(functools.partial(_put, timed))
             except CaptureError:

@@ -24,9 +24,10 @@ from dalycapture.reader import read_capture
 from dalycapture.source import Source
 
 if TYPE_CHECKING:
-    from dalyref.packet import Packet
     from collections.abc import Sequence
     from pathlib import Path
+
+    from dalyref.packet import Packet
 
 # draft-ietf-opsawg-pcapng, 4.3.1: bits 0-1 direction, 24 CRC error, 26 too short
 INBOUND, OUTBOUND, CRC, SHORT = 0b01, 0b10, 1 << 24, 1 << 26
@@ -39,13 +40,11 @@ class Memory:
 
     def __init__(self) -> None:
         self.blocks: list[bytes] = []
-
-    @property
-    def size(self) -> int:
-        return sum(map(len, self.blocks))
+        self.size = 0
 
     def write(self, block: bytes) -> bool:
         self.blocks.append(block)
+        self.size += len(block)
         return True
 
     def pump(self) -> None: ...
@@ -155,8 +154,8 @@ def test_python_pcapng_reads_it(sample: Path) -> None:
 
     with sample.open("rb") as file:
         blocks: list[Any] = list(FileScanner(file))
-    section = next(b for b in blocks if isinstance(b, SectionHeader))
-    assert section.options["shb_userappl"] == "dalyshark 9.9"
+    header: Any = next(b for b in blocks if isinstance(b, SectionHeader))
+    assert header.options["shb_userappl"] == "dalyshark 9.9"
     sides: list[Any] = [b for b in blocks if isinstance(b, InterfaceDescription)]
     assert sides[0].options["if_name"] == "/dev/ttyUSB0"
     assert sides[0].options["if_description"] == "dalyshark bus=main 9600 8N1 /dev/ttyUSB0"
