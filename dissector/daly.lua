@@ -62,10 +62,15 @@ end
 
 -- State of the capture that is open -------------------------------------------------------------------------------------
 
-local capture
+local capture -- as read in order, once
 local interfaces -- by number: what is known of each
 local handed -- packets that were given to the user's own DLT_USER setting, by number
 local read_to -- number of the newest packet that was read
+
+-- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one, and
+-- without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows better:
+-- if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows at once.)
+local blind -- nil, or { capture =, interfaces =, after = number of the next packet by number, last =, only =, several = }
 
 -- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
 local others, unset = {}, {}
@@ -75,21 +80,26 @@ local interface_description = Field.new("frame.interface_description")
 local packet_comment = Field.new("frame.comment")
 local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
 
-function daly.init()
-  capture = streams.capture({
+local function new_capture()
+  return streams.capture({
     baud = math.max(1, prefs.baud),
     quiet = seconds(prefs.quiet),
     echo = seconds(prefs.echo),
     reply = seconds(prefs.reply),
     burst = seconds(prefs.burst),
   })
-  interfaces, handed, read_to = {}, {}, 0
 end
 
-local function interface_of()
+function daly.init()
+  capture = new_capture()
+  interfaces, handed, read_to, blind = {}, {}, 0, nil
+end
+
+-- The interface of the packet at hand, in this list of those known; the number -1 stands for one that can't be told.
+local function interface_of(known)
   local id = interface_id()
-  local key = id and id.value or 0
-  local interface = interfaces[key]
+  local key = id and id.value or -1
+  local interface = known[key]
   if not interface then
     local info = interface_description()
     local description = info and tostring(info.value) or ""
@@ -100,25 +110,46 @@ local function interface_of()
       bus = description:match("bus=([^%s,;]+)") or key,
       streams = {},
     }
-    interfaces[key] = interface
+    known[key] = interface
   end
   return interface
 end
 
-local function stream_of(interface, direction)
+local function stream_of(from, interface, direction)
   local stream = interface.streams[direction]
   if not stream then
     local side = direction ~= -1 and direction or nil
-    stream = streams.stream(capture, interface.key * 4 + direction, interface.bus, side)
+    stream = streams.stream(from, interface.key * 4 + direction, interface.bus, side)
     interface.streams[direction] = stream
   end
   return stream
+end
+
+-- What to show a packet from that was read without its interface: the capture, and whether its end is known.
+-- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
+local function second_look(number, direction, time, raw)
+  if number == blind.after[blind.last] then
+    local interface = interface_of(blind.interfaces)
+    streams.first(blind.capture, stream_of(blind.capture, interface, direction), number, time, raw)
+    blind.last = number
+    blind.only = blind.only or interface.key
+    blind.several = blind.several or interface.key ~= blind.only
+  end
+  if not blind.several then
+    return capture, true
+  elseif number <= blind.last then
+    return blind.capture, false
+  end
+  return nil, true
 end
 
 -- Tree --------------------------------------------------------------------------------------------------------------------
 
 -- Where the fields of the record at hand go. `wanted` is false when nobody asked for any of our fields.
 local tree, tvb, at, visible, wanted
+
+-- What was found out about the record at hand: `capture`, but for a second look.
+local view
 
 local out = {}
 
@@ -238,7 +269,7 @@ local frame = {} -- the one at hand, for daly_payload
 
 -- An A5 frame: fields, expert notes; returns words, source, destination.
 local function a5(item, raw, slot, again)
-  local results = capture.results
+  local results = view.results
   local address, id = byte(raw, 2, 3)
   local flag = results.flag[slot]
   local beginning, source, destination = names_of(address, id)
@@ -488,13 +519,17 @@ function daly.dissector(buffer, pinfo, parent)
   wanted = parent:referenced(handle)
   visible = parent.visible
 
-  if again then
-    whole = capture.plans[number] == nil and length == 13 and byte(raw, 1) == 0xA5
-  else
+  view = capture
+  if not again then
     read_to = number
-    local interface = interface_of()
-    local stream = stream_of(interface, pinfo.p2p_dir)
-    whole = streams.first(capture, stream, number, pinfo.rel_ts, raw)
+    local interface = interface_of(interfaces)
+    local direction = pinfo.p2p_dir
+    whole = streams.first(capture, stream_of(capture, interface, direction), number, pinfo.rel_ts, raw)
+    if interface.key == -1 then
+      blind = blind or { capture = new_capture(), interfaces = {}, after = {}, last = 0, newest = 0 }
+      blind.after[blind.newest] = number
+      blind.newest = number
+    end
     if not interface.ours then
       if whole or has_frame(streams.plan(capture, number, false)) then
         interface.ours = true
@@ -502,6 +537,11 @@ function daly.dissector(buffer, pinfo, parent)
         handed[number] = true
       end
     end
+  else
+    if blind then
+      view, again = second_look(number, pinfo.p2p_dir, pinfo.rel_ts, raw)
+    end
+    whole = view and view.plans[number] == nil and length == 13 and byte(raw, 1) == 0xA5
   end
 
   if whole then
@@ -518,13 +558,10 @@ function daly.dissector(buffer, pinfo, parent)
     return length
   end
 
-  local items = streams.plan(capture, number, again)
-  if not items then -- read for the first time out of order: with -R, packets are left out and numbers come twice
-    items = {}
-    for _, record in ipairs(records.as_gap(raw, 1)) do
-      local span = record.last - record.first + 1
-      items[#items + 1] = { kind = record.kind, name = record.name, at = record.first - 1, length = span }
-    end
+  local items = view and streams.plan(view, number, again)
+  if not items then -- nothing is known of it (see second_look; with -R, packets are left out and numbers come twice)
+    view = streams.capture({ baud = 9600 })
+    items = records.alone(raw)
   end
   if handed[number] then
     if has_frame(items) then

@@ -247,6 +247,16 @@ function M.peek(cutter)
   return M.take(copy, "", true)
 end
 
+--- The records of some bytes that nothing came before or after.
+function M.alone(bytes)
+  local items = M.take(M.new(), bytes, true)
+  for i = 1, #items do
+    local item = items[i]
+    item.at, item.length, item.slot = item.first - 1, item.last - item.first + 1, i
+  end
+  return items
+end
+
 --- Some bytes by themselves, as a gap of their own: what is shown of held bytes before it is certain.
 function M.as_gap(bytes, base)
   local out = {}

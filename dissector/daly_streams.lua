@@ -158,7 +158,8 @@ local function drop_settled(stream)
   local packets, base = stream.packets, stream.cutter.base
   local done = 0
   while packets[done + 1] and packets[done + 1].last < base do
-    packets[done + 1].plan.open = nil
+    local plan = packets[done + 1].plan
+    plan.open, plan.held, plan.guess = nil, nil, nil
     done = done + 1
   end
   if done > 0 then

@@ -77,7 +77,7 @@ class Stream:
 
     def flush(self) -> list[Located]:
         """Silence or the end: return what is held."""
-        return self._locate(self._splitter.flush()) if self._splitter.pending else []
+        return self._locate(self._splitter.flush())
 
     def _locate(self, records: Iterable[Record]) -> list[Located]:
         chunks = self._chunks

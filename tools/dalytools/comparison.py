@@ -103,7 +103,8 @@ def compare(
     result = Comparison()
     link_types = _link_types(path, result)
     wanted = ",".join(str(number) for number in sorted(link_types))
-    arguments = ["-2"] if two_pass else []
+    # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
+    arguments = ["-2", "-Y", "frame"] if two_pass else []
     arguments += ["-o", f"daly.link_types:{wanted}", "-r", str(tshark.readable(path)), "-T", "fields"]
     arguments += ["-E", "separator=/t", "-E", f"aggregator={_BETWEEN_VALUES}", "-E", "quote=n", "-e", "frame.number"]
     for name in (_LUA_ERROR, *FIELD_NAMES):

@@ -252,3 +252,12 @@ def test_a_whole_real_cycle() -> None:
     assert len(requests) + len(replies) == len(CYCLE)
     assert all("daly.reply_in" in record.fields for record in requests)
     assert all("daly.request_in" in record.fields for record in replies)
+
+
+def test_silence_closes_a_gap_that_holds_nothing_back() -> None:
+    """A damaged frame is certain at once; what comes after silence is a gap of its own, here another maker's Modbus."""
+    damaged = bytes.fromhex("a58098080000000000008000c5")
+    foreign = bytes.fromhex("020300f4000285ca")
+    decoder = Decoder()
+    records = decoder.feed(Packet(1, 0, damaged)) + decoder.feed(Packet(2, 5_000_000_000, foreign)) + decoder.finish()
+    assert [(record.number, record.kind) for record in records] == [(1, "bad_checksum"), (2, "foreign")]

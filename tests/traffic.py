@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Made traffic that goes looking for trouble: everything docs/records.md has a rule for, near the rules' borders.
+
+Not a bus that could be (the simulator does that), but one that both readings must agree on: all addresses, IDs that
+answer in bursts with numbers going everywhere, requests that come again just inside and just outside the limits, Modbus
+of both dialects, other makers' frames, payloads full of A5 and 08, damage of every kind, packets cut anywhere, several
+interfaces, taps with a direction, events. Deterministic by seed.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+CHARACTER_NS = 10 * 1_000_000_000 // 9600
+EPOCH_NS = 1_700_000_000_000_000_000
+
+ADDRESSES = (0x40, 0x40, 0x40, 0x41, 0x4F, 0x80, 0x20, 0x50, 0xFF, 0x01, 0x01, 0x01, 0x02, 0x03, 0x10, 0x11, 0x00)
+IDS = (*range(0x90, 0x99), 0x95, 0x95, 0x95, 0x96, 0x96, 0x94, 0x98, 0x57, 0x62, 0xD8, 0xD9, 0x21, 0xA5, 0x08)
+BYTES = (0xA5, 0xA5, 0x08, 0x08, 0x01, 0x40, 0x90, 0x95, 0xD2, 0x03, 0x51, 0x81, 0x06, 0x10, 0x83, 0x0A, 0x02, 0x00, 0xFF)
+# Milliseconds of quiet between items: a rule of docs/records.md lies near most of them.
+QUIET_MS = (0, 0, 0, 1, 5, 14, 37, 37, 37, 60, 98, 102, 140, 230, 248, 252, 300, 490, 515, 700, 960, 1010, 1300)
+
+
+@dataclass(frozen=True)
+class Made:
+    """One packet: interface, direction (0 none, 1 inbound, 2 outbound), time, bytes (none: an event)."""
+
+    interface: int
+    direction: int
+    time_ns: int
+    data: bytes
+
+
+DESCRIPTIONS = ("dalyshark bus=one", "dalyshark bus=one second tap", "dalyshark", "dalyshark bus=two, 9600")
+
+
+def a5(address: int, data_id: int, data: bytes) -> bytes:
+    head = bytes((0xA5, address, data_id, 8)) + data
+    return head + bytes((sum(head) & 0xFF,))
+
+
+def with_crc(body: bytes) -> bytes:
+    crc = 0xFFFF
+    for byte in body:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
+    return body + crc.to_bytes(2, "little")
+
+
+def with_crc8(body: bytes) -> bytes:
+    crc = 0
+    for byte in body:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 7) & 0xFF if crc & 0x80 else crc << 1 & 0xFF
+    return body + bytes((crc,))
+
+
+class Traffic:
+    """An endless bus of trouble."""
+
+    def __init__(self, seed: int) -> None:
+        self.r = random.Random(seed)
+        self.sent: list[bytes] = [a5(0x40, 0x90, bytes(8))]
+
+    def _payload(self) -> bytes:
+        r = self.r
+        style = r.random()
+        if style < 0.35:
+            return bytes(r.choice(BYTES) for _ in range(8))
+        if style < 0.5:
+            return bytes(8)
+        return r.randbytes(8)
+
+    def _frame(self) -> bytes:
+        r = self.r
+        address, data_id = r.choice(ADDRESSES), r.choice(IDS)
+        data = bytearray(self._payload())
+        if address < 0x20 and data_id == 0x94 and r.random() < 0.7:
+            data[0:2] = bytes((r.choice((0, 1, 4, 5, 8, 14, 16, 47, 48, 49)), r.choice((0, 1, 2, 7, 8, 21, 22))))
+        return a5(address, data_id, bytes(data))
+
+    def _request(self) -> bytes:
+        r = self.r
+        if r.random() < 0.3:
+            return r.choice(self.sent[-6:])
+        frame = a5(r.choice((0x40, 0x40, 0x41, 0x80)), r.choice((0x90, 0x95, 0x95, 0x96, 0x98)), bytes(8))
+        self.sent.append(frame)
+        del self.sent[:-12]
+        return frame
+
+    def _burst(self) -> list[bytes]:
+        r = self.r
+        address, data_id = r.choice((1, 1, 2)), r.choice((0x95, 0x95, 0x95, 0x96, 0x57))
+        first = r.choice((1, 1, 1, 0, 0, 3, 14))
+        numbers = list(range(first, first + r.choice((1, 2, 3, 5, 6, 16, 17))))
+        trouble = r.random()
+        if trouble < 0.1:
+            numbers.insert(r.randrange(len(numbers) + 1), r.choice((0, 1, 2, 16, 17, 255)))
+        elif trouble < 0.2:
+            del numbers[r.randrange(len(numbers))]
+        elif trouble < 0.3:
+            at = r.randrange(len(numbers))
+            numbers.insert(at, numbers[at])
+        frames: list[bytes] = []
+        for number in numbers:
+            cells = b"".join(r.randrange(2500, 3700).to_bytes(2, "big") for _ in range(3))
+            frames.append(a5(address, data_id, bytes((number & 0xFF,)) + cells + bytes((r.choice(BYTES),))))
+        return frames
+
+    def _modbus(self) -> bytes:
+        r = self.r
+        board = r.choice((1, 1, 2, 16))
+        style = r.randrange(9)
+        asks = r.choice((0xD2, 0x80 + board))
+        answers = r.choice((0xD2, 0x50 + board))
+        two = bytes((r.choice((0, 0, 1)), r.randrange(256)))
+        count = r.choice((1, 2, 3, 62))
+        match style:
+            case 0:
+                return with_crc(bytes((asks, 3)) + two + count.to_bytes(2, "big"))
+            case 1:
+                return with_crc(bytes((answers, 3, 2 * count)) + bytes(r.choice(BYTES) for _ in range(2 * count)))
+            case 2:
+                return with_crc(bytes((r.choice((asks, answers)), 6)) + two + r.randbytes(2))
+            case 3:
+                return with_crc(bytes((asks, 16)) + two + count.to_bytes(2, "big") + r.randbytes(2 * count))
+            case 4:
+                head = bytes((asks, 16)) + two + count.to_bytes(2, "big") + bytes((2 * count,))
+                return with_crc(head + r.randbytes(2 * count))
+            case 5:
+                return with_crc(bytes((answers, 16)) + two + count.to_bytes(2, "big"))
+            case 6:
+                return with_crc(bytes((answers, r.choice((0x83, 0x86, 0x90)), r.randrange(1, 5))))
+            case 7:
+                return with_crc(bytes((r.choice((0x81, 0x51)), r.choice((0x83, 3, 4)), 1)) + two)
+            case _:
+                return with_crc(bytes((asks, 3)) + two + b"\x00\x01") + b"\x00"  # a zero more checks again
+
+    def _others(self) -> bytes:
+        r = self.r
+        style = r.randrange(5)
+        address = r.choice((1, 2, 17, 0xF7))
+        match style:
+            case 0:
+                return with_crc(bytes((address, 3, 0, r.randrange(256), 0, 2)))
+            case 1:
+                return with_crc(bytes((address, r.choice((3, 4)), 4)) + bytes(r.choice(BYTES) for _ in range(4)))
+            case 2:
+                return with_crc(bytes((address, 6, 0, 1, 0, 5))) * r.choice((1, 2))
+            case 3:
+                return with_crc8(bytes((0x0A, r.randrange(1, 23), 2)) + r.randbytes(2))
+            case _:
+                return bytes((0x0A, r.randrange(1, 24), r.choice((2, 4, 3))))
+
+    def _damaged(self, data: bytes) -> bytes:
+        r = self.r
+        bad = bytearray(data)
+        at = r.randrange(len(bad))
+        match r.randrange(5):
+            case 0:
+                bad[at] ^= 1 << r.randrange(8)
+            case 1:
+                del bad[at]
+            case 2:
+                bad.insert(at, r.choice(BYTES))
+            case 3:
+                del bad[at:]
+            case _:
+                del bad[:at]
+        return bytes(bad)
+
+    def _item(self) -> bytes:
+        r = self.r
+        style = r.random()
+        if style < 0.25:
+            return self._request()
+        if style < 0.5:
+            return self._frame()
+        if style < 0.68:
+            return b"".join(self._burst())
+        if style < 0.78:
+            return self._modbus()
+        if style < 0.86:
+            return self._others()
+        if style < 0.95:
+            return bytes(r.choice(BYTES) for _ in range(r.choice((1, 2, 4, 5, 13, 30))))
+        return r.randbytes(r.choice((1, 7, 40, 300)))
+
+    def packets(self) -> Iterator[Made]:
+        """Yield packets for ever, in the order of a file."""
+        r = self.r
+        now = EPOCH_NS
+        while True:
+            data = self._item()
+            if data and r.random() < 0.12:
+                data = self._damaged(data)
+            now += r.choice(QUIET_MS) * 1_000_000 + r.randrange(900_000)
+            interface = r.choice((0, 0, 0, 0, 1, 2, 3))
+            direction = r.choice((1, 2)) if interface == 1 else 0
+            if r.random() < 0.01:
+                yield Made(interface, direction, now, b"")
+            style = r.random()
+            at = 0
+            while at < len(data):
+                if style < 0.55:  # a frame's length at a time: bursts come frame by frame
+                    size = 13 if data[0] == 0xA5 else len(data)
+                elif style < 0.8:
+                    size = len(data)
+                else:
+                    size = r.choice((1, 2, 3, 7, 12, 14, 20, 64))
+                piece = data[at : at + size]
+                yield Made(interface, direction, now, piece)
+                at += len(piece)
+                now += len(piece) * CHARACTER_NS
+                if style >= 0.95 and r.random() < 0.3:
+                    now += r.choice((100, 240, 260)) * 1_000_000
+                    if r.random() < 0.3:  # somebody else speaks in between
+                        yield Made(2, 0, now, self._request())
