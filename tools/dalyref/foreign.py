@@ -70,7 +70,7 @@ def _asks(data: bytes, at: int, end: int) -> bool:
 
 
 def _sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
-    """Return where the exchange at `at` ends; a request alone is one when another, or the end, follows it."""
+    """Return where the exchange at `at` ends: behind the reply, or behind the request when what follows is none."""
     if not _asks(data, at, end):
         return _DEAD
     behind = at + 3
@@ -81,8 +81,7 @@ def _sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
         return _MAYBE
     if stop <= end and crc8(data[at : stop - 1]) == data[stop - 1]:
         return stop
-    follows = end - behind >= 3 and _asks(data, behind, end)
-    return behind if follows or (ended and behind == end) else _DEAD
+    return behind  # what follows must be another request, or nothing
 
 
 class Run:

@@ -162,6 +162,14 @@ def test_the_same_number_after_a_request_is_a_new_burst() -> None:
     capture.put(50, frame(1, 0x96, 1, 60))
     capture.put(70, frame(1, 0x96, 1, 61))
     assert capture.field("daly.burst.repeat") == [None, None, None, True]
+    capture = Capture()
+    capture.put(0, frame(0x40, 0x96))
+    capture.put(15, frame(0x80, 0x96))
+    capture.put(30, frame(1, 0x96, 1, 60))  # answers the newest
+    capture.put(60, frame(0x40, 0x96))  # an echo of the first, between two frames
+    capture.put(80, frame(1, 0x96, 1, 61))
+    assert capture.field("daly.direction") == [1, 1, 2, 3, 2]
+    assert capture.field("daly.burst.repeat") == [None, None, None, None, True]
 
 
 def test_stale_slots_and_frames_beyond_the_count() -> None:

@@ -116,11 +116,11 @@ def test_header_fields() -> None:
 
 
 def test_exact_tenths() -> None:
-    # 29989 -> -1.1 A; 3 -> 0.3 %: dividing by ten gives the nearest double, multiplying by 0.1 does not
-    fields = payload.decode(0x90, bytes.fromhex("021100037525 0003".replace(" ", "")))
+    # 29997 -> -0.3 A; 3 -> 0.3 %: dividing by ten gives the nearest double, multiplying by 0.1 does not
+    fields = payload.decode(0x90, bytes.fromhex("02110003752d0003"))
     assert fields["daly.pack.voltage"] == 52.9
     assert fields["daly.pack.gather_voltage"] == 0.3
-    assert fields["daly.pack.current"] == -1.1
+    assert fields["daly.pack.current"] == -0.3
     assert fields["daly.soc"] == 0.3
 
 

@@ -58,16 +58,17 @@ def test_window_that_ends_first() -> None:
 
 
 def test_of_two_that_end_together_the_first_begun() -> None:
-    # the Modbus frame is the data and sum of the A5 frame: bytes 8..12
-    for address in range(256):
-        exception = with_crc("519002")
-        head = bytes((0xA5, address, 0x57, 8)) + b"\x01\x02\x03\x04" + exception[:-1]
-        if sum(head) & 0xFF == exception[-1]:
+    # bytes 5..12 of the A5 frame are a good write of one register: both end at byte 13
+    for register in range(65536):
+        write = with_crc(f"5106{register:04x}0001")
+        if sum(b"\xa5\x01\x57\x08\x00" + write[:-1]) & 0xFF == write[-1]:
             break
     else:
-        pytest.fail("no such address")
-    frame = head + exception[-1:]
+        pytest.fail("no such register")
+    frame = b"\xa5\x01\x57\x08\x00" + write
+    assert a5.is_good(frame)
     assert cut(frame) == [(FRAME, frame.hex())]
+    assert cut(b"\x00" + frame[1:]) == [(JUNK, (b"\x00" + frame[1:5]).hex()), (FRAME, write.hex())]
 
 
 # -- the exception: A5 in A5 -----------------------------------------------------------------------------------------
@@ -277,6 +278,13 @@ def test_event_between_foreign_and_junk() -> None:
     assert eventful(sinowealth[:3], sinowealth[3:]) == [(FOREIGN, 3), (JUNK, 3)]  # a request alone, then no request
     # a beginning in the piece before a foreign one ends with its piece
     assert eventful(REPLY[:6], sinowealth + REPLY) == [(SHORT, 6), (FOREIGN, 6), (FRAME, 13)]
+
+
+def test_piece_before_an_event_comes_as_soon_as_it_is_certain() -> None:
+    splitter = Splitter()
+    assert splitter.feed(real.data("sino-0-req") + real.data("sino-0-rsp")) == []
+    splitter.event()
+    assert [record.kind for record in splitter.feed(b"\xa5")] == [FOREIGN]
 
 
 # -- foreign ----------------------------------------------------------------------------------------------------------

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""``dalyshark decode``: what the reference decoder reads in a capture, for people (table) or programs (jsonl)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from dalycapture.errors import CaptureError
+from dalycapture.linktype import link_type_name
+from dalycapture.reader import read_capture
+from dalyref.decoder import Decoded, Decoder, Options
+from dalyref.packet import SERIAL_LINK_TYPES
+from dalytools.problem import Problem
+from dalytools.progress import progress_bar
+from dalytools.record_lines import line
+from dalytools.terminal_text import plain
+from dalytools.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_COLOURS = {
+    "request": "cyan",
+    "reply": "default",
+    "echo": "yellow",
+    "modbus": "magenta",
+    "bad_checksum": "red",
+    "short": "red",
+    "junk": "bright_black",
+    "foreign": "blue",
+    "event": "bold yellow",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.description = "Show what the reference decoder reads in capture files."
+    parser.epilog = "Exit status: 0 all read, 2 a file could not be read, or not to its end (what was read is shown)."
+    parser.add_argument(
+        "files", nargs="+", metavar="FILE", help="capture file (pcapng or pcap), or - for standard input"
+    )
+    parser.add_argument(
+        "--format",
+        choices=("table", "jsonl"),
+        default="table",
+        help="a line a record for people, or an object a record",
+    )
+    parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
+    defaults = Options()
+    parser.add_argument("--baud", type=_positive_int, default=defaults.baud, metavar="N", help="for times on the wire")
+    for name, text in (
+        ("quiet", "give an incomplete frame up after so long a silence"),
+        ("echo", "a request repeated within this is an echo"),
+        ("reply", "a request waits so long for its reply"),
+        ("burst", "an answer in several frames ends after so long a silence"),
+    ):
+        default: float = getattr(defaults, name)
+        parser.add_argument(
+            f"--{name}", type=_seconds, default=default, metavar="S", help=f"{text} (seconds, default {default:g})"
+        )
+
+
+def _positive_int(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1 <= value <= 100_000_000:
+        raise argparse.ArgumentTypeError(f"{text!r} is no baud rate; 9600 is one")
+    return value
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time in seconds; 0.25 is one")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Decode every file; what could be read of a damaged one is shown before its problem."""
+    files: list[str] = args.files
+    output: str = args.output
+    options = Options(args.baud, args.quiet, args.echo, args.reply, args.burst)
+    if output != "-":
+        for name in files:
+            if name != "-" and os.path.realpath(name) == os.path.realpath(output):
+                raise Problem(f"{output} is the capture itself; name another file with -o")
+    problems: list[str] = []
+    with nullcontext(sys.stdout) if output == "-" else whole_file(output) as out:
+        put = _printer(out, args.format, several=len(files) > 1)
+        shown = 0
+        for name in files:
+            said = len(problems)
+            shown += _decode_file(name, options, put, problems)
+            out.flush()
+            for problem in problems[said:]:
+                print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
+        if problems and not shown and output != "-":
+            raise Problem(f"nothing could be read, so {output} was not written")
+    return 2 if problems else 0
+
+
+def _decode_file(name: str, options: Options, put: Callable[[str, Decoded], None], problems: list[str]) -> int:
+    """Put every record of one file out; return how many, and append what is wrong with the file to `problems`."""
+    decoder = Decoder(options)
+    shown = 0
+    others: set[int] = set()
+    packets = passed = 0
+    with progress_bar(f"decode {plain(Path(name).name)}") as advance:
+
+        def batches() -> Iterator[list[Decoded]]:
+            nonlocal packets, passed
+            try:
+                for packet in read_capture(name):
+                    packets += 1
+                    if packet.link_type not in SERIAL_LINK_TYPES:
+                        others.add(packet.link_type)
+                        passed += 1
+                    yield decoder.feed(packet)
+                    if packets % 1024 == 0:
+                        advance(packets)
+            except CaptureError as error:
+                problems.append(str(error))
+            yield decoder.finish()
+
+        for batch in batches():
+            for record in batch:
+                put(name, record)
+            shown += len(batch)
+    if others:
+        names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
+        if passed == packets:
+            problems.append(f"{name}: its link type is {names}; a Daly bus is captured as 147 (USER0) to 162 (USER15)")
+        else:
+            print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
+    elif not packets and not problems:
+        print(f"dalyshark decode: {plain(name)}: the capture holds no packet", file=sys.stderr)  # noqa: T201
+    return shown
+
+
+def jsonl(record: Decoded, file: str = "") -> str:
+    """Return a record as one line of JSON. ``time`` is a number with nine decimals: exact, in seconds since 1970."""
+    sign = "-" if record.time_ns < 0 else ""
+    seconds, nanos = divmod(abs(record.time_ns), 1_000_000_000)
+    head = f'{{"number": {record.number}, "time": {sign}{seconds}.{nanos:09d}, '
+    rest: dict[str, object] = {"kind": record.kind.value, "transport": record.transport, "fields": record.fields}
+    if file:
+        rest = {"file": file, **rest}
+    return head + json.dumps(rest)[1:]
+
+
+def _printer(out: TextIO, form: str, *, several: bool) -> Callable[[str, Decoded], None]:
+    """Return what puts one record out: (file name, record). `several` files: it is said which."""
+    if form == "jsonl":
+        return lambda name, record: print(jsonl(record, name if several else ""), file=out)
+    last = ""
+
+    def heading(name: str) -> None:
+        nonlocal last
+        if several and name != last:
+            print(f"{plain(name)}:", file=out)
+            last = name
+
+    if not _coloured(out):
+
+        def put(name: str, record: Decoded) -> None:
+            heading(name)
+            print(line(record), file=out)
+
+        return put
+
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(file=out, highlight=False, soft_wrap=True)
+
+    def put_coloured(name: str, record: Decoded) -> None:
+        heading(name)
+        shown = line(record)
+        place, who, what, values, warnings = shown.pieces()
+        colour = _COLOURS.get(shown.kind, "default")
+        text = Text.assemble((place, "bright_black"), (who + what, colour), values, (warnings, "bold red"))
+        text.rstrip()
+        console.print(text)
+
+    return put_coloured
+
+
+def _coloured(out: TextIO) -> bool:
+    return out.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
