@@ -323,12 +323,12 @@ def test_several_comments() -> None:
 
 def test_python_pcapng_writes_and_we_read() -> None:
     from pcapng import FileWriter
-    from pcapng.blocks import EnhancedPacket, SectionHeader
+    from pcapng.blocks import EnhancedPacket, InterfaceDescription, SectionHeader
 
     stream = io.BytesIO()
     header: Any = SectionHeader(options={"shb_userappl": "x"}, endianness=">")
     described: Any = header.new_member(
-        __import__("pcapng.blocks", fromlist=["x"]).InterfaceDescription,
+        InterfaceDescription,
         link_type=147,
         options={"if_description": "other bus=z", "if_tsresol": b"\x09"},
     )
