@@ -99,7 +99,7 @@ class _Device:
         import fcntl
         import termios
 
-        # A pty outlives our closing, and would stay closed to others.
+        # A pty outlives our closing, and would stay closed to others (a kill leaves it so; real ports forget).
         with contextlib.suppress(OSError):
             fcntl.ioctl(self._fd, termios.TIOCNXCL)
         os.close(self._fd)

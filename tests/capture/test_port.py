@@ -134,7 +134,7 @@ def test_no_permission_names_the_group(bus: Bus, monkeypatch: pytest.MonkeyPatch
 def test_busy_names_who_has_it(bus: Bus) -> None:
     code = (
         "import sys; from dalycapture.port import open_port\n"
-        "port = open_port(sys.argv[1]); print('open', flush=True); sys.stdin.read()"
+        "port = open_port(sys.argv[1]); print('open', flush=True); sys.stdin.read(); port.close()"
     )
     other = subprocess.Popen([sys.executable, "-c", code, bus.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert other.stdin
