@@ -236,7 +236,7 @@ words[0x95] = function(frame)
   local list = { format("frame %d", n) }
   local values = { a * 256 + b, c * 256 + d, e * 256 + f }
   if real > 0 then
-    list[2] = format(" cells %d-%d:", before + 1, before + real)
+    list[2] = real == 1 and format(" cell %d:", before + 1) or format(" cells %d-%d:", before + 1, before + real)
     for i = 1, real do
       list[#list + 1] = format("%d", values[i])
     end

@@ -139,10 +139,10 @@ class Bus:
             began = self.now_ns
             length = 0
             for data in answer.frames:
-                heard = self._damaged(data)
-                good = good and heard is data
-                sent.append(Sent(began + int(length * self._char_ns), name, heard))
-                length += len(heard)
+                on_wire = self._damaged(data)
+                good = good and on_wire is data
+                sent.append(Sent(began + int(length * self._char_ns), name, on_wire))
+                length += len(on_wire)
             self.now_ns = began + int(length * self._char_ns)
         return sent, good, request_end
 

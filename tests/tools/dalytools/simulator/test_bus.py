@@ -144,6 +144,12 @@ def test_a_damaged_reply_is_asked_for_again() -> None:
     assert again > 50
 
 
+def test_a_damaged_reply_is_not_what_the_next_board_hears() -> None:
+    boards = (Board(1), Board(2), Board(3))
+    sent = islice(traffic(Scenario(boards=boards, damage=Damage(cut=0.3))), 3000)
+    assert {piece.sender for piece in sent} == {"host", "board 1", "board 2", "board 3"}
+
+
 def test_client_is_served_between_the_hosts_polls() -> None:
     bus = Bus(Scenario())
     bus.poll()
