@@ -296,7 +296,8 @@ def on_a_terminal(*words: str, **environment: str) -> str:
     """Run the command with a terminal as its standard output; return what the terminal got."""
     ours, theirs = pty.openpty()
     command = [sys.executable, "-c", "from dalytools.cli import entry; entry()", "decode", *words]
-    variables = {"PATH": os.environ["PATH"], "TERM": "xterm-256color", "TZ": "UTC", **environment}
+    kept = {name: value for name, value in os.environ.items() if name not in {"NO_COLOR", "FORCE_COLOR", "COLUMNS"}}
+    variables = {**kept, "TERM": "xterm-256color", "TZ": "UTC", **environment}
     process = subprocess.Popen(command, stdout=theirs, stderr=theirs, stdin=subprocess.DEVNULL, env=variables)
     os.close(theirs)
     got = b""
