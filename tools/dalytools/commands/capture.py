@@ -55,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="pcapng",
         help="file format (default: %(default)s)",
     )
+    parser.add_argument("--pcap", dest="file_format", action="store_const", const="pcap", help="the same as -F pcap")
     parser.add_argument(
         "--link-type",
         type=_link_type,
@@ -95,7 +96,7 @@ def _capture(args: argparse.Namespace, limits: Limits, status: _Status | None) -
         sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}")
         sniffer = Sniffer(port, interface, [sink], limits=limits, listener=status)
         if status:
-            status.tally = sniffer.tally
+            status.show(sniffer.tally)
         return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM))
     finally:
         port.close()
@@ -105,22 +106,24 @@ class _Status:
     """A line on the terminal that counts along, a few times a second."""
 
     def __init__(self) -> None:
-        self.tally = Tally()
+        self._tally: Tally | None = None
         self._next = 0.0
-        self._shown = False
+
+    def show(self, tally: Tally) -> None:
+        """Show this tally from now on."""
+        self._tally = tally
+        text = f"{counted(tally.records, 'record')}, {tally.good} good, {tally.bad} bad, {counted(tally.bytes, 'byte')}"
+        print(f"\r{text}; Ctrl-C ends\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - it is for the terminal
 
     def __call__(self, _: TimedRecord) -> None:
         now = time.monotonic()
-        if now >= self._next:
+        if self._tally and now >= self._next:
             self._next = now + STATUS_EVERY_S
-            self._shown = True
-            tally = self.tally
-            text = f"{counted(tally.records, 'record')}, {tally.good} good, {tally.bad} bad, {tally.bytes} bytes"
-            print(f"\r{text}\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - it is for the terminal
+            self.show(self._tally)
 
     def clear(self) -> None:
         """Take the line away."""
-        if self._shown:
+        if self._tally:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - it is for the terminal
 
 

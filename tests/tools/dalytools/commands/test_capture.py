@@ -90,15 +90,19 @@ def test_a_signal_is_a_normal_end(number: signal.Signals, bus: Bus, tmp_path: Pa
     assert f"from {bus.port} at 9600 baud; ended: stopped." in err
 
 
-def test_stop_conditions(bus: Bus, tmp_path: Path) -> None:
+@pytest.mark.parametrize("option", [["-F", "pcap"], ["--pcap"]])
+def test_stop_conditions_and_classic_pcap(option: list[str], bus: Bus, tmp_path: Path) -> None:
     path = tmp_path / "x.pcap"
-    process = start(bus.port, "-w", path, "-F", "pcap", "-a", "duration:60", "-c", 3, "-q")
+    process = start(bus.port, "-w", path, *option, "-a", "duration:60", "-c", 3, "-q")
     until(lambda: size_of(path) == 24)
     for count in range(5):
         bus.send(numbered(count))
     assert finish(process) == (0, b"", "")
     assert packets_in(path) == 3
-    code, _, err = finish(start(bus.port, "-w", path, "-a", "duration:0.05"))
+
+
+def test_a_silent_bus_gets_advice(bus: Bus, tmp_path: Path) -> None:
+    code, _, err = finish(start(bus.port, "-w", tmp_path / "x.pcapng", "-a", "duration:0.05"))
     assert code == 0
     assert "Nothing was heard" in err
 
@@ -207,6 +211,21 @@ def test_unwritable_directory_as_somebody(bus: Bus, tmp_path: Path) -> None:
     assert done.stderr == (
         "dalyshark capture: no permission to write /x.pcapng; choose another directory, or change its permissions\n"
     )
+
+
+def test_a_terminal_gets_a_status_line(bus: Bus, tmp_path: Path) -> None:
+    with Bus() as terminal:
+        stderr = os.open(terminal.port, os.O_WRONLY | os.O_NOCTTY)
+        command = [*COMMAND, bus.port, "-w", str(tmp_path / "x.pcapng"), "-c", "1"]
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=stderr)
+        os.close(stderr)
+        until(lambda: listening(tmp_path / "x.pcapng"))
+        bus.send(numbered(1))
+        assert process.wait(30) == 0
+        shown = terminal.heard().decode()
+    assert shown.startswith("\r0 records, 0 good, 0 bad, 0 bytes; Ctrl-C ends")
+    assert "\r1 record, 1 good, 0 bad, 13 bytes; Ctrl-C ends" in shown
+    assert shown.endswith(f"\r\x1b[K{tmp_path / 'x.pcapng'}: 1 record (1 good), 13 bytes in " + shown.split(" in ")[-1])
 
 
 def test_junk_alone_gets_advice(bus: Bus, tmp_path: Path) -> None:
