@@ -157,6 +157,8 @@ class Sniffer:
         while self._end is None:
             if pipes:
                 self._watch_pipes(waiter)
+                if self._end:  # the last reader went away: nothing would wake us
+                    break
             wake_at = min(until, heard + SILENCE_S) if self._framer.pending else until
             ready = waiter.wait(None if wake_at == math.inf else wake_at - now)
             now = time.monotonic()

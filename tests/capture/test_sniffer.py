@@ -239,10 +239,22 @@ def test_a_reader_that_goes_away_does_not_end_the_evidence(
     assert "its reader went away" in running.sniffer.tally.notes[0]
 
 
-def test_the_last_reader_that_goes_away_ends_it(port: Port) -> None:
+@pytest.mark.parametrize("heard", [0, 1])
+def test_the_last_reader_that_goes_away_ends_it(heard: int, bus: Bus, port: Port) -> None:
     reading, view = pipe_sink()
     with sniffing(port, view) as running:
+        assert os.read(reading, 4) == b"\x0a\x0d\x0d\x0a"
+        bus.send(FRAME * heard)
+        until(lambda: running.sniffer.tally.seconds > 0 or not heard)
+        time.sleep(0.05)  # it sleeps on a silent bus now
         os.close(reading)
+        assert running.join().end is End.READER_GONE
+
+
+def test_a_reader_that_was_never_there_ends_it(port: Port) -> None:
+    reading, view = pipe_sink()
+    os.close(reading)
+    with sniffing(port, view) as running:
         assert running.join().end is End.READER_GONE
 
 
