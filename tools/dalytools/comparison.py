@@ -5,13 +5,16 @@
                                              +--> differences: packet, field, both values
     reference decoder, records             --+
 
-Records are compared packet by packet: all values of a field in a packet, in order. Cut-off frames and junk may be divided
-differently by packets and silence (docs/records.md 4): of those, what lies between two other records is put together
-first, and its bytes compared.
+A second tshark reads the file once, as a live view does: only for errors of Lua, which the first of two passes hides.
+
+Records are compared packet by packet: all values of a field in a packet, in order. Cut-off frames and junk may be
+divided differently by packets and silence (docs/records.md 4): of those, what lies between two other records is put
+together first, and its bytes compared.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import subprocess
 import threading
@@ -28,7 +31,7 @@ from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator, Iterator
     from pathlib import Path
 
     from dalyref.packet import Packet
@@ -39,7 +42,8 @@ _UNDECODED = FIELD_NAMES.index("daly.undecoded")
 _KIND = FIELD_NAMES.index("daly.kind")
 _TRANSPORT = FIELD_NAMES.index("daly.transport")
 _DIALECT = FIELD_NAMES.index("daly.dialect")
-_LUA_ERROR = "_ws.lua.error"
+_LUA_ERROR, _EXPERT = "_ws.lua.error", "_ws.expert.message"
+_COLUMNS = len(FIELD_NAMES) + 3
 _TIMES = frozenset({"daly.response_time"})
 _TIME_TOLERANCE_S = 2e-6  # the dissector calculates in floating point from the start of the capture
 _MOST_SHOWN = 1000
@@ -92,42 +96,67 @@ class _Rest:
         self.open = ""
 
 
-def compare(
-    tshark: Tshark, path: Path, *, progress: Callable[[int], None] | None = None, two_pass: bool = True
-) -> Comparison:
+def compare(tshark: Tshark, path: Path, *, progress: Callable[[int], None] | None = None) -> Comparison:
     """Compare both readings of a capture file.
 
-    progress: called now and then with the number of packets compared. Raises Problem when the file cannot be read at all,
-    or has no packet of a link type of ours. A file that is cut off is compared as far as it goes (``broken`` tells).
+    progress: called now and then with the number of packets compared. Raises Problem when the file cannot be read at
+    all, or has no packet of a link type of ours. A file that is cut off is compared as far as it goes: ``broken``.
     """
+    _refuse_pipes(path)
     result = Comparison()
-    link_types = _link_types(path, result)
-    wanted = ",".join(str(number) for number in sorted(link_types))
-    # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
-    arguments = ["-2", "-Y", "frame"] if two_pass else []
-    arguments += ["-o", f"daly.link_types:{wanted}", "-r", str(tshark.readable(path)), "-T", "fields"]
-    arguments += ["-E", "separator=/t", "-E", f"aggregator={_BETWEEN_VALUES}", "-E", "quote=n", "-e", "frame.number"]
-    for name in (_LUA_ERROR, *FIELD_NAMES):
+    wanted = ",".join(str(number) for number in sorted(_link_types(path, result)))
+    arguments = ["-o", f"daly.link_types:{wanted}", "-r", str(tshark.readable(path)), "-T", "fields"]
+    arguments += ["-E", "separator=/t", "-E", f"aggregator={_BETWEEN_VALUES}", "-E", "quote=n"]
+    for name in ("frame.number", *FIELD_NAMES, _LUA_ERROR, _EXPERT):
         arguments += ["-e", name]
-    process = tshark.start(
-        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+    # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
+    with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
+        _walk(rows, path, result, progress)
+    told = any(difference.field == _LUA_ERROR for difference in result.differences)
+    with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
+        for row in rows:
+            values = _values(row)
+            if not told:
+                result.add(Difference(int(values[0]), _LUA_ERROR, values[-1], "none"))
+    return result
+
+
+def _refuse_pipes(path: Path) -> None:
+    if str(path) == "-" or path.is_fifo() or path.is_socket():
+        raise Problem(f"{path} can be read only once, and two readers need it; save it in a file first")
+
+
+@contextlib.contextmanager
+def _rows(tshark: Tshark, arguments: list[str], result: Comparison) -> Generator[IO[bytes]]:
+    """Give tshark's output, line by line; what it says of itself goes to the result."""
+    process = tshark.start(arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None  # noqa: S101 - asked for above
     assert process.stderr is not None  # noqa: S101 - asked for above
     messages: list[bytes] = []
     reader = threading.Thread(target=_drain, args=(process.stderr, messages), daemon=True)
     reader.start()
     try:
-        _walk(process.stdout, path, result, progress)
+        yield process.stdout
+    except BaseException:
+        process.kill()
+        raise
     finally:
         process.stdout.close()
-        process.kill() if process.poll() is None and result.broken == "stopped" else None
         process.wait()
         reader.join()
-    complaint = lua_complaint(b"".join(messages).decode(errors="replace"))
-    if complaint:
+        process.stderr.close()
+    said = b"".join(messages).decode(errors="replace")
+    complaint = lua_complaint(said)
+    if complaint and not any(difference.dissector == complaint for difference in result.differences):
         result.add(Difference(0, _LUA_ERROR, complaint, "none"))
-    return result
+    if process.returncode and not result.broken:
+        last = said.strip().splitlines()[-1:] or ["it said nothing"]
+        result.broken = f"tshark ended with status {process.returncode}: {last[0]}"
+
+
+def _values(row: bytes) -> list[str]:
+    """Return the values of a row; the last one is free text."""
+    return row.decode("utf-8", errors="replace").rstrip("\r\n").split(_BETWEEN_FIELDS, _COLUMNS - 1)
 
 
 def _drain(stream: IO[bytes], into: list[bytes]) -> None:
@@ -146,7 +175,7 @@ def _link_types(path: Path, result: Comparison) -> set[int]:
     try:
         for packet in read_capture(path):
             packets += 1
-            (ours if packet.link_type in DALY_LINK_TYPES else others).add(packet.link_type)
+            (ours if _is_ours(packet) else others).add(packet.link_type)
     except CaptureError as error:
         if not packets:
             raise Problem(str(error)) from None
@@ -156,7 +185,11 @@ def _link_types(path: Path, result: Comparison) -> set[int]:
     if not ours:
         names = ", ".join(link_type_name(number) for number in sorted(others))
         raise Problem(f"{path}: its link type is {names}; a Daly bus is captured as 147 (USER0) to 162 (USER15)")
-    return ours - {TAKEN_LINK_TYPE} or {147}
+    return ours
+
+
+def _is_ours(packet: Packet) -> bool:
+    return packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE
 
 
 def _packets(path: Path) -> Iterator[Packet]:
@@ -177,7 +210,7 @@ def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[i
     last_seen = 0
     expected = deque[int]()
     for row in rows:
-        values = row.decode("utf-8", errors="replace").rstrip("\r\n").split(_BETWEEN_FIELDS)
+        values = _values(row)
         number = int(values[0])
         # Feed the reference until all its records of this packet are final.
         while not ended and not (ready and ready[-1].number > number):
@@ -186,7 +219,7 @@ def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[i
                 ready.extend(decoder.finish())
                 ended = True
                 break
-            if packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE:
+            if _is_ours(packet):
                 streams[packet.number] = (packet.interface, packet.direction)
                 expected.append(packet.number)
                 ready.extend(decoder.feed(packet))
@@ -210,7 +243,7 @@ def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[i
         if packet is None:
             ready.extend(decoder.finish())
             ended = True
-        elif packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE:
+        elif _is_ours(packet):
             ready.extend(decoder.feed(packet))
     if ready:
         result.add(
@@ -220,18 +253,17 @@ def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[i
         dissector.close(last_seen)
         reference.close(last_seen)
         _compare_rest(dissector, reference, result)
+        if len(dissector.pieces) != len(reference.pieces):
+            shown, told = (f"{len(side.pieces)} more stretches of bytes" for side in (dissector, reference))
+            result.add(Difference(last_seen, "bytes before", shown, told))
 
 
-def _packet(
-    number: int, values: list[str], mine: list[Decoded], rest: tuple[_Rest, _Rest], result: Comparison
-) -> None:
+def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Rest, _Rest], result: Comparison) -> None:
     """Compare all records that end in one packet."""
-    if values[0]:
-        result.add(Difference(number, _LUA_ERROR, values[0], "none"))
-    seen = [value.split(_BETWEEN_VALUES) if value else [] for value in values[1:]]
-    if len(seen) != len(FIELD_NAMES):
-        result.add(Difference(number, "row", f"{len(seen)} fields", f"{len(FIELD_NAMES)} fields"))
-        return
+    *values, lua_error, expert = values
+    if lua_error:
+        result.add(Difference(number, _LUA_ERROR, expert, "none"))
+    seen = [value.split(_BETWEEN_VALUES) if value else [] for value in values]
     _set_aside(number, seen, rest[0])
     told: dict[str, list[object]] = {}
     for record in mine:

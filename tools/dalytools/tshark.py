@@ -7,8 +7,8 @@ Three traps stand behind this file:
   with the dissector (and, where needed, the capture) in a folder that this user can read;
 - tshark's exit status says nothing about Lua: its messages are read for ``Lua:``, and a first run on two known packets
   proves that the dissector is there;
-- a copy of the dissector in the user's plugin folder, or preferences, would change what is compared: HOME and Wireshark's
-  folders point to an empty folder.
+- a copy of the dissector in the user's plugin folder, or preferences, would change what is compared: HOME and
+  Wireshark's folders point to an empty folder.
 
 ``DALYSHARK_TSHARK`` names another tshark than the one on the PATH.
 """
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 ORDINARY_USER = 65534  # nobody
+_OPEN_PLACE = "/tmp"  # noqa: S108 - a new folder of its own in it, where TMPDIR is root's alone
 
 _PLACES = (  # where installers put it without telling the PATH
     r"C:\Program Files\Wireshark\tshark.exe",
@@ -62,9 +63,10 @@ def find_tshark() -> str:
     """Return the path of tshark. Raises Problem when there is none."""
     asked = os.environ.get("DALYSHARK_TSHARK")
     if asked:
-        if not os.access(asked, os.X_OK):
-            raise Problem(f"DALYSHARK_TSHARK is {asked}, which is not a program")
-        return asked
+        program = shutil.which(asked)
+        if program is None:
+            raise Problem(f"DALYSHARK_TSHARK is {asked}, which is not a program; name another, or unset it")
+        return str(Path(program).absolute())
     found = shutil.which("tshark") or next((place for place in _PLACES if Path(place).exists()), None)
     if found is None:
         raise Problem(_MISSING)
@@ -81,7 +83,8 @@ class Tshark:
     def __init__(self) -> None:
         self._program = find_tshark()
         self._as_root = hasattr(os, "geteuid") and os.geteuid() == 0
-        self._folder = tempfile.TemporaryDirectory(prefix="dalyshark-", ignore_cleanup_errors=True)
+        place = _OPEN_PLACE if self._as_root and not _anyone_enters(Path(tempfile.gettempdir())) else None
+        self._folder = tempfile.TemporaryDirectory(prefix="dalyshark-", dir=place, ignore_cleanup_errors=True)
         self._home = Path(self._folder.name)
         self.version = ""
 
@@ -105,13 +108,15 @@ class Tshark:
 
     def readable(self, path: Path) -> Path:
         """Return a path of this file that the tshark which is started can read: a copy where it must be."""
-        if not self._as_root or _anyone_reads(path):
+        if not self._as_root:
             return path
+        if _anyone_reads(path):
+            return path.resolve()  # the way there, from here or through links, need not be open to all
         copy = self._home / f"{len(list(self._home.iterdir()))}-{path.name}"
         try:
             shutil.copyfile(path, copy)
         except OSError as error:
-            raise Problem(f"{path}: cannot be read: {error.strerror}") from None
+            raise Problem(f"{path}: cannot be copied for tshark to {self._home}: {error.strerror}") from None
         copy.chmod(0o644)
         return copy
 
@@ -121,17 +126,28 @@ class Tshark:
 
     def start(self, arguments: Sequence[str], **streams: Any) -> subprocess.Popen[bytes]:
         """Start tshark with these arguments; streams: stdin, stdout, stderr and the like, as for Popen."""
-        return subprocess.Popen(self.command(*arguments), **self._surroundings(), **streams)
+        return self._start(self.command(*arguments), **streams)
+
+    def start_bare(self, arguments: Sequence[str], **streams: Any) -> subprocess.Popen[bytes]:
+        """Start tshark in the same surroundings without our dissector: a measure for it."""
+        return self._start([self._program, "-n", *arguments], **streams)
 
     def run(self, *arguments: str, stdin: IO[bytes] | None = None) -> subprocess.CompletedProcess[bytes]:
         """Run tshark to its end; its output and messages are in the result."""
-        return subprocess.run(
-            self.command(*arguments),
-            stdin=stdin or subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            **self._surroundings(),
-        )
+        return self._run(self.command(*arguments), stdin or subprocess.DEVNULL)
+
+    def _start(self, words: list[str], **streams: Any) -> subprocess.Popen[bytes]:
+        started: Any = subprocess.Popen(words, **self._surroundings(), **streams)  # noqa: S603 - our words, no shell
+        return started
+
+    def _run(self, words: list[str], stdin: IO[bytes] | int = subprocess.DEVNULL) -> subprocess.CompletedProcess[bytes]:
+        with self._start(words, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            try:
+                output, messages = process.communicate()
+            except BaseException:
+                process.kill()
+                raise
+        return subprocess.CompletedProcess(words, process.returncode, output, messages)
 
     @property
     def _lua(self) -> Path:
@@ -158,18 +174,19 @@ class Tshark:
     def _prove(self, proof: Path) -> None:
         try:
             first = self.run("-r", str(proof), "-T", "fields", "-e", "daly.kind", "-e", "daly.soc")
-            version = subprocess.run(
-                [self._program, "--version"], capture_output=True, check=False, **self._surroundings()
-            )
+            version = self._run([self._program, "--version"])
         except OSError as error:
-            raise Problem(f"tshark does not start: {error.strerror}") from None
+            raise Problem(f"{self._program} does not start: {error.strerror}") from None
         self.version = _version(version.stdout.decode(errors="replace"))
         if first.stdout.split() == [b"frame", b"frame", b"50"]:
             return
         messages = first.stderr.decode(errors="replace")
-        why = next((line for line in messages.splitlines() if "Lua" in line or "daly" in line), messages.strip())
+        complaint = lua_complaint(messages)
+        if complaint:
+            raise Problem(f"tshark {self.version} does not load our dissector: {complaint}; install dalyshark again")
+        said = messages.strip().splitlines()
         raise Problem(
-            f"tshark {self.version} does not load our dissector: {why or 'it ignores Lua scripts'}; "
+            f"tshark {self.version} does not load our dissector: {said[-1] if said else 'it ignores Lua scripts'}; "
             "is it built with Lua (tshark --version tells)?"
         )
 
@@ -197,16 +214,26 @@ def _version(text: str) -> str:
     return "of unknown version"
 
 
+def _anyone_enters(folder: Path) -> bool:
+    """Tell whether every user may go into this folder, which exists, and all above it."""
+    folder = folder.resolve()
+    return all(each.stat().st_mode & stat.S_IXOTH for each in (folder, *folder.parents))
+
+
 def _anyone_reads(path: Path) -> bool:
     """Tell whether every user may read this file: its own bits and those of all folders above it."""
     try:
         path = path.resolve()
-        above = all(folder.stat().st_mode & stat.S_IXOTH for folder in path.parents)
-        return above and bool(path.stat().st_mode & stat.S_IROTH)
+        return _anyone_enters(path.parent) and bool(path.stat().st_mode & stat.S_IROTH)
     except OSError:
         return False
 
 
 def lua_complaint(messages: str) -> str | None:
-    """Return what tshark says about an error in our Lua, or None."""
-    return next((line for line in messages.splitlines() if "Lua:" in line or "Lua Error" in line), None)
+    """Return what tshark says about an error in our Lua, as one line, or None."""
+    lines = messages.splitlines()
+    for at, line in enumerate(lines):
+        if "Lua:" in line or "Lua Error" in line:
+            more = lines[at + 1 : at + 2] if line.rstrip().endswith(":") else []  # what it was stands below
+            return " ".join(part.strip() for part in (line, *more))
+    return None
