@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import io
 import os
 import signal
 import sys
@@ -12,9 +14,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 from dalytools import __version__
 from dalytools.problem import Problem
+from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from types import FrameType
 
 COMMANDS = {
     "watch": "sniff a bus, write the capture file, show every record decoded as it comes",
@@ -31,7 +35,7 @@ class _Parser(argparse.ArgumentParser):
     """argparse, but an unusable command line is one line of what is wrong and one of what to do."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_PROBLEM, f"{self.prog}: {message}\nTry: {self.prog} --help\n")
+        self.exit(EXIT_PROBLEM, f"{self.prog}: {plain(message)}\nTry: {self.prog} --help\n")
 
 
 def _top_parser() -> _Parser:
@@ -63,17 +67,58 @@ def main(argv: Sequence[str] | None = None) -> int:
     run: Callable[[argparse.Namespace], int] = module.run
     add_arguments(parser)
     try:
-        return run(parser.parse_args(words[1:]))
+        status = run(parser.parse_args(words[1:]))
+        sys.stdout.flush()
     except Problem as problem:
-        print(f"dalyshark {command}: {problem}", file=sys.stderr)  # noqa: T201
-        return EXIT_PROBLEM
+        return _failed(command, str(problem))
     except BrokenPipeError:  # the reader of our standard output went away: `dalyshark decode ... | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _let_output_go()
         return 0
+    except OSError as error:  # what a command did not foresee, and a full disk behind `> file`
+        _let_output_go()
+        return _failed(command, f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
+    return status
+
+
+def _failed(command: str, why: str) -> int:
+    print(f"dalyshark {command}: {plain(why)}", file=sys.stderr)  # noqa: T201
+    return EXIT_PROBLEM
+
+
+def _let_output_go() -> None:
+    """Write what is left for standard output, to nowhere if it must be: nothing is to fail at the interpreter's end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _stop(number: int, _frame: FrameType | None) -> NoReturn:
+    """End in order: temporary folders are removed, children are waited for."""
+    raise SystemExit(128 + number)
+
+
+def _three_streams() -> None:
+    """Make standard input, output and error be there (``>&-``), else the next file opened would take their number."""
+    for fd in range(3):
+        try:
+            os.fstat(fd)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123 - open to the end
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123 - open to the end
 
 
 def entry() -> NoReturn:
     """Console script."""
+    _three_streams()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that knows less than a comment holds
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _stop)
     sys.exit(main())

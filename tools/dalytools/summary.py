@@ -141,9 +141,8 @@ def _board_lines(address: int, board: _BoardSeen) -> list[str]:
         out.append(f"  faults     {', '.join(board.faults) or 'none'}")
     wait = board.wait
     if wait.count:
-        out.append(
-            f"  response   {wait.low * 1000:.1f} to {wait.high * 1000:.1f} ms, mean {wait.total / wait.count * 1000:.1f} ms"
-        )
+        mean = wait.total / wait.count
+        out.append(f"  response   {wait.low * 1000:.1f} to {wait.high * 1000:.1f} ms, mean {mean * 1000:.1f} ms")
     return out
 
 

@@ -5,5 +5,5 @@ from __future__ import annotations
 
 
 def plain(text: str) -> str:
-    """Return the text with every control character (and what else does not print) as an escape: a file cannot steer it."""
+    """Return the text with all that does not print, control characters above all, as escapes: it cannot steer it."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -39,17 +39,18 @@ def run(args: argparse.Namespace) -> int:
     with Tshark() as tshark:
         for name in args.files:
             try:
-                with progress_bar(f"check {Path(name).name}") as advance:
+                with progress_bar(f"check {plain(Path(name).name)}") as advance:
                     result = compare(tshark, Path(name), progress=advance)
             except Problem as problem:
-                print(f"dalyshark check: {problem}", file=sys.stderr)  # noqa: T201
+                print(f"dalyshark check: {plain(str(problem))}", file=sys.stderr)  # noqa: T201
                 worst = 2
                 continue
             show(name, result, quiet=args.quiet)
             records += result.records
             differences += result.found
             if result.broken:
-                print(f"dalyshark check: {result.broken}; compared what is there", file=sys.stderr)  # noqa: T201
+                said = plain(f"{result.broken}; compared what is there")
+                print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201
             worst = max(worst, 2 if result.broken else 1 if result.found else 0)
         print(sum_up(len(args.files), records, differences, tshark.version))  # noqa: T201
     return worst

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import os
 import signal
 import sys
@@ -37,23 +38,24 @@ from dalytools.terminal_text import plain
 from dalytools.tshark import Tshark, dissector_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from dalytools.simulator.scenario import Scenario
 
 SIMULATED_S = 20.0
+FOLDER = "captures"
 APPLICATION = f"dalyshark {__version__}"
 
-_COLOURS = (  # of a line, by what is in it
-    ("Bad checksum", "bold red"),
-    ("Cut-off", "red"),
-    ("Junk", "bright_black"),
-    ("Not Daly", "blue"),
-    ("Event", "bold yellow"),
-    ("Echo ", "yellow"),
-    ("[retry]", "yellow"),
-    ("Request ", "cyan"),
-    ("Modbus ", "magenta"),
+_COLOURS = (  # of a line, by what is in it: terminal colours (SGR)
+    ("Event", "1;33"),
+    ("Bad checksum", "1;31"),
+    ("Cut-off", "31"),
+    ("Junk", "90"),
+    ("Not Daly", "34"),
+    ("Echo ", "33"),
+    ("[retry]", "33"),
+    ("Request ", "36"),
+    ("Modbus ", "35"),
 )
 
 
@@ -64,9 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Ctrl-C ends it. Nothing is sent to the bus. Without PORT: a simulated bus, for 20 s."
     )
     parser.epilog = "Exit status: 0 fine, 1 the two decoders differ, 2 could not run or the port was lost."
-    parser.add_argument(
-        "port", metavar="PORT", nargs="?", help="device, socket://HOST:PORT or rfc2217://HOST:PORT"
-    )
+    parser.add_argument("port", metavar="PORT", nargs="?", help="device, socket://HOST:PORT or rfc2217://HOST:PORT")
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file (default: captures/daly-TIME.pcapng)")
     parser.add_argument("--duration", type=_seconds, metavar="S", help="stop after so many seconds")
     parser.add_argument("--baud", type=_baud, default=9600, help="bits per second (default: %(default)s)")
@@ -79,35 +79,41 @@ def run(args: argparse.Namespace) -> int:
     try:
         bus_name(args.bus)
         path = _output(args.output)
+        screen = _Screen()
         with Tshark() as tshark:
-            with _bus(args.port) as (port_name, simulated):
-                duration = args.duration or (SIMULATED_S if simulated else None)
-                tally = _watch(args, tshark, port_name, path, duration)
+            with _bus(args.port, args.baud) as (port_name, simulated):
+                if simulated and args.duration is None:
+                    args.duration = SIMULATED_S
+                tally = _watch(args, tshark, screen, port_name, path)
+            if screen.failure:
+                return _unseen(screen.failure, path)
             return _sum_up(tshark, path, tally)
     except CaptureError as error:
         raise Problem(str(error)) from None
 
 
 @contextlib.contextmanager
-def _bus(port: str | None) -> Iterator[tuple[str, bool]]:
+def _bus(port: str | None, baud: int) -> Generator[tuple[str, bool]]:
     """Give the port to listen to, and whether it is a simulated one, which runs as long as this lasts."""
     if port is not None:
         yield port, False
         return
     from dalytools.simulator.live import SimulatedBus
 
-    print("No PORT given: a simulated bus. First a real session is played back, then simulated boards take over.")  # noqa: T201
-    bus = SimulatedBus(_scenario(), replay=_real_session())
-    with bus:
+    session = _real_session()
+    first = "First a real session is played back, then simulated boards take over." if session else ""
+    print(f"No PORT given: a simulated bus. {first}".rstrip())  # noqa: T201
+    with SimulatedBus(_scenario(baud), replay=session) as bus:
         print(f"Clients can talk to these boards on {bus.client}")  # noqa: T201
         yield bus.tap, True
 
 
-def _scenario() -> Scenario:
+def _scenario(baud: int) -> Scenario:
     """Two boards, one of which has a fault that comes and goes."""
     from dalytools.simulator.scenario import Board, Event, Pack, Scenario
 
     return Scenario(
+        baud=baud,
         boards=(
             Board(1, pack=Pack(cells=16, sensors=2, speed=4)),
             Board(2, pack=Pack(cells=8, sensors=1, start_soc=80.0, speed=4)),
@@ -132,62 +138,88 @@ def _real_session() -> Path | None:
 
 
 def _output(asked: str | None) -> Path:
+    """Return where the capture goes: the file asked for, else a new one in the folder captures."""
     if asked == "-":
         raise Problem("watch keeps a file of evidence, so -w - is not possible; use: dalyshark capture PORT -w -")
     if asked:
         return Path(asked)
-    folder = Path("captures")
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise Problem(f"cannot make the folder captures here ({error.strerror}); name a file: -w FILE") from None
     stem = time.strftime("daly-%Y%m%d-%H%M%S")
-    number = 0
-    while True:
-        path = folder / f"{stem}{f'-{number}' if number else ''}.pcapng"
-        if not path.exists():
-            return path
-        number += 1
+    names = (f"{stem}{f'-{number}' if number else ''}.pcapng" for number in itertools.count())
+    return next(path for name in names if not (path := Path(FOLDER, name)).exists())
 
 
-def _watch(args: argparse.Namespace, tshark: Tshark, port_name: str, path: Path, duration: float | None) -> Tally:
+def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, port_name: str, path: Path) -> Tally:
+    duration: float | None = args.duration
     port = open_port(port_name, args.baud)
     with contextlib.ExitStack() as stack:
         stack.callback(port.close)
         interface = tap(port_name, bus=args.bus, baud=args.baud, hardware=port.hardware)
-        file = open_writer(path, application=APPLICATION)
-        sinks = [file]
-        view = None
-        if not args.quiet:
-            view = LiveView(tshark, _printer(), link_type=interface.link_type, application=APPLICATION)
-            sinks.append(view.sink)
+        if not args.output:
+            _make_folder(path.parent)
+        sinks = [open_writer(path, application=APPLICATION)]
+        view, faults = None, list[str]()
         until = f"for {duration:g} s" if duration else "until Ctrl-C"
-        print(f"Listening to {port_name} at {args.baud} baud {until}; writing {path}\n", flush=True)  # noqa: T201
+        said = plain(f"Listening to {port_name} at {args.baud} baud {until}; writing {path}")
+        print(f"{said}\n", flush=True)  # noqa: T201
+        if not args.quiet:
+
+            def ended(why: str) -> None:
+                faults.append(f"the live view broke off, the capture did not: {why}")
+                print(f"dalyshark watch: {faults[-1]}", file=sys.stderr)  # noqa: T201
+
+            view = LiveView(tshark, screen, ended, link_type=interface.link_type, application=APPLICATION)
+            stack.callback(view.finish)
+            sinks.append(view.sink)
         sniffer = Sniffer(port, interface, sinks, limits=Limits(duration=duration))
+        screen.when_gone = sniffer.stop
         tally = sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM))
-        if view:
-            complaint = view.finish()
-            if complaint:
-                tally.notes.append(complaint)
+    if view and view.sink.failure:  # `ended` has told it better
+        with contextlib.suppress(ValueError):
+            tally.notes.remove(str(view.sink.broken()))
+    tally.notes += faults
     return tally
 
 
-def _printer() -> Callable[[str], None]:
-    """Return what prints a line: in colour on a terminal, unless NO_COLOR is set."""
-    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
-        return lambda line: print(line, flush=True)  # noqa: T201
-    from rich.console import Console
-    from rich.text import Text
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise Problem(f"cannot make the folder {folder} here ({error.strerror}); name a file: -w FILE") from None
 
-    console = Console(highlight=False, soft_wrap=True)
 
-    def show(line: str) -> None:
-        style = next((colour for word, colour in _COLOURS if word in line), "")
-        if not style and "Faults: " in line and not line.endswith("Faults: none"):
-            style = "bold red"
-        console.print(Text(line, style=style))
+class _Screen:
+    """Prints lines: in colour on a terminal, unless NO_COLOR is set. ``when_gone`` is called when nobody reads them."""
 
-    return show
+    def __init__(self) -> None:
+        self.failure: OSError | None = None
+        self.when_gone: Callable[[], None] = lambda: None
+        dumb = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+        self._coloured = sys.stdout.isatty() and not dumb
+
+    def __call__(self, line: str) -> None:
+        if self.failure:
+            return
+        try:
+            print(f"\x1b[{colour}m{line}\x1b[m" if (colour := self._colour(line)) else line, flush=True)  # noqa: T201
+        except OSError as error:
+            self.failure = error
+            self.when_gone()
+
+    def _colour(self, line: str) -> str:
+        if not self._coloured:
+            return ""
+        if "Faults: " in line and not line.endswith("Faults: none"):
+            return "1;31"
+        return next((colour for word, colour in _COLOURS if word in line), "")
+
+
+def _unseen(failure: OSError, path: Path) -> int:
+    """Say the rest to standard error, as standard output is gone."""
+    why = f"standard output: {(failure.strerror or str(failure)).lower()}; the capture ended and is in {path}"
+    if not isinstance(failure, BrokenPipeError):
+        raise Problem(why)
+    print(f"dalyshark watch: {plain(why)}", file=sys.stderr)  # noqa: T201
+    raise failure  # its usual end: status 0
 
 
 def _sum_up(tshark: Tshark, path: Path, tally: Tally) -> int:
@@ -207,22 +239,32 @@ def _sum_up(tshark: Tshark, path: Path, tally: Tally) -> int:
         print("  No good frame: wrong baud rate, or A and B swapped?")  # noqa: T201
     for note in tally.notes:
         print(f"  Note: {plain(note)}")  # noqa: T201
-    differences = 0
-    if tally.records:
-        with progress_bar("check") as advance:
-            result = compare(tshark, path, progress=advance)
-        differences = result.found
-        print(  # noqa: T201
-            f"\nCheck: dissector (tshark {tshark.version}) against reference decoder, {result.records} records: "
-            f"{counted(differences)}"
-        )
-        for difference in result.differences[:SHOWN]:
-            print(f"  {plain(str(difference))}")  # noqa: T201
-    print(f"\nThe capture: {path}")  # noqa: T201
-    print(f"Open it:     wireshark -X lua_script:{dissector_folder() / 'daly.lua'} {path}")  # noqa: T201
+    differences = _checked(tshark, path) if tally.records else 0
+    where = plain(str(path))
+    print(f"\nThe capture: {where}")  # noqa: T201
+    print(f"Open it:     wireshark -X lua_script:{dissector_folder() / 'daly.lua'} {where}")  # noqa: T201
     if tally.end is End.PORT_LOST:
         raise Problem(tally.problem)
     return 1 if differences else 0
+
+
+def _checked(tshark: Tshark, path: Path) -> int:
+    """Compare both readings of the file; print and return how many differences there are."""
+    try:
+        with progress_bar("check") as advance:
+            result = compare(tshark, path, progress=advance)
+    except KeyboardInterrupt:
+        print(f"\nCheck: left out, as you wish; later: dalyshark check {path}")  # noqa: T201
+        return 0
+    print(  # noqa: T201
+        f"\nCheck: dissector (tshark {tshark.version}) against reference decoder, {result.records} records: "
+        f"{counted(result.found)}"
+    )
+    for difference in result.differences[:SHOWN]:
+        print(f"  {plain(str(difference))}")  # noqa: T201
+    if result.broken:
+        raise Problem(f"the check broke off: {result.broken}; the capture is in {path}")
+    return result.found
 
 
 def _baud(text: str) -> int:
