@@ -15,13 +15,14 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tests.traffic import DESCRIPTIONS, EPOCH_NS, Made, Traffic
+
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
 from dalytools.comparison import compare
 from dalytools.simulator.bus import traffic
 from dalytools.simulator.scenario import Board, Damage, Host, Pack, Scenario
 from dalytools.tshark import Tshark
-from tests.traffic import DESCRIPTIONS, EPOCH_NS, Made, Traffic
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,10 +43,12 @@ def likely_bus(seed: int) -> Iterator[Made]:
 
 
 def trouble(seed: int) -> Iterator[Made]:
+    """Return traffic near every rule's borders (tests/traffic.py)."""
     return Traffic(seed).packets()
 
 
 def write(path: Path, packets: Iterator[Made]) -> None:
+    """Write packets to a pcapng file with the interfaces they name."""
     with open_writer(path) as writer:
         for description in DESCRIPTIONS:
             writer.add_interface(Interface(name="made", description=description))
@@ -54,6 +57,7 @@ def write(path: Path, packets: Iterator[Made]) -> None:
 
 
 def main() -> int:
+    """Compare file after file until there are enough records. Return 1 when anything differed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=1)
