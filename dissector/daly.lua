@@ -5,7 +5,7 @@
 --
 --   A5 frame    A5 | address | data ID | 08 | d0 d1 d2 d3 d4 d5 d6 d7 | sum          paper Daly UART/485 V1.2
 --
---   packets --daly_streams--> records --daly_bus--> what they mean to each other --this file, daly_payload--> tree, columns
+--   packets --daly_streams--> records --daly_bus--> their meaning --daly_view--> tree, columns
 --
 -- Runs in Lua 5.2 (Wireshark 4.0, 4.2) to 5.4 (4.4, 4.6).
 
@@ -27,9 +27,9 @@ end
 local field_module = require("daly_fields")
 local streams = require("daly_streams")
 local records = require("daly_records")
-local payload = require("daly_payload")
+local view = require("daly_view")
 
-local fields, experts, data_ids = field_module.fields, field_module.experts, field_module.DATA_IDS
+view.setup(daly)
 daly.fields = field_module.list
 local expert_list = {}
 for _, e in pairs(field_module.experts) do
@@ -37,9 +37,7 @@ for _, e in pairs(field_module.experts) do
 end
 daly.experts = expert_list
 
-local byte, format, concat = string.byte, string.format, table.concat
-
--- Preferences: the constants of docs/records.md, and where our packets come from ------------------------------------------
+-- Preferences: the constants of docs/records.md, and where our packets come from ------------------
 
 local FIRST_DLT, LAST_DLT, PKTAP_DLT = 147, 162, 149
 
@@ -47,37 +45,40 @@ local prefs = daly.prefs
 prefs.link_types = Pref.range(
   "Link types (DLT)",
   "147",
-  "Link types, 147 (USER0) to 162 (USER15), whose packets hold bytes of a Daly bus. 149 is left out: Wireshark itself uses it.",
+  "Link types, 147 (USER0) to 162 (USER15), whose packets hold bytes of a Daly bus. Not 149: Wireshark itself uses it.",
   LAST_DLT
 )
 prefs.baud = Pref.uint("Baud rate", 9600, "Baud rate of the bus, for the time that bytes take on the wire")
-prefs.quiet = Pref.uint("Incomplete frame given up after (ms)", 250, "An incomplete frame is given up after so much quiet")
+prefs.quiet =
+  Pref.uint("Incomplete frame given up after (ms)", 250, "An incomplete frame is given up after so much quiet")
 prefs.echo = Pref.uint("Echo within (ms)", 100, "A request that comes again within this time is an echo, later a retry")
 prefs.reply = Pref.uint("Reply within (ms)", 1000, "A request waits so long for its reply")
-prefs.burst = Pref.uint("Burst ends after quiet of (ms)", 500, "Frames of 0x95, 0x96 and texts further apart are not one burst")
+prefs.burst =
+  Pref.uint("Burst ends after quiet of (ms)", 500, "Frames of 0x95, 0x96 and texts further apart are not one burst")
 
 local function seconds(milliseconds)
   return milliseconds / 1000
 end
 
--- State of the capture that is open -------------------------------------------------------------------------------------
+-- State of the capture that is open ---------------------------------------------------------------
 
 local capture -- as read in order, once
 local interfaces -- by number: what is known of each
 local handed -- packets that were given to the user's own DLT_USER setting, by number
 local read_to -- number of the newest packet that was read
 
--- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one, and
--- without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows better:
--- if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows at once.)
-local blind -- nil, or { capture =, interfaces =, after = number of the next packet by number, last =, only =, several = }
+-- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one,
+-- and without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows
+-- better: if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows
+-- at once.) nil, or { capture =, interfaces =, after = the next packet's number by number, newest =: the last of those,
+-- last =: number of the last packet read again, only =: the interface, several =: it is not the only one }.
+local blind
 
 -- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
 local others, unset = {}, {}
 
 local interface_id = Field.new("frame.interface_id")
 local interface_description = Field.new("frame.interface_description")
-local packet_comment = Field.new("frame.comment")
 local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
 
 local function new_capture()
@@ -128,12 +129,12 @@ end
 -- What to show a packet from that was read without its interface: the capture, and whether its end is known.
 -- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
 local function second_look(number, direction, time, raw)
+  local interface = interface_of(blind.interfaces)
+  blind.only = blind.only or interface.key
+  blind.several = blind.several or interface.key ~= blind.only
   if number == blind.after[blind.last] then
-    local interface = interface_of(blind.interfaces)
     streams.first(blind.capture, stream_of(blind.capture, interface, direction), number, time, raw)
     blind.last = number
-    blind.only = blind.only or interface.key
-    blind.several = blind.several or interface.key ~= blind.only
   end
   if not blind.several then
     return capture, true
@@ -143,343 +144,7 @@ local function second_look(number, direction, time, raw)
   return nil, true
 end
 
--- Tree --------------------------------------------------------------------------------------------------------------------
-
--- Where the fields of the record at hand go. `wanted` is false when nobody asked for any of our fields.
-local tree, tvb, at, visible, wanted
-
--- What was found out about the record at hand: `capture`, but for a second look.
-local view
-
-local out = {}
-
-function out.bytes(field, first, length, unit)
-  if tree:referenced(field) then
-    local item = tree:add(field, tvb(at + 4 + first, length))
-    if visible and unit then
-      item:append_text(unit)
-    end
-  end
-end
-
-function out.value(field, first, length, value, unit)
-  if tree:referenced(field) then
-    local item = tree:add(field, tvb(at + 4 + first, length), value)
-    if visible and unit then
-      item:append_text(unit)
-    end
-  end
-end
-
-function out.little(field, first, length)
-  if tree:referenced(field) then
-    tree:add_le(field, tvb(at + 4 + first, length))
-  end
-end
-
-function out.cell(field, first, length, number, unit)
-  if tree:referenced(field) then
-    local item = tree:add(field, tvb(at + 4 + first, length))
-    if visible then
-      item:prepend_text(format("Cell %d: ", number)):append_text(unit)
-    end
-  end
-end
-
-function out.made(field, value, unit)
-  if tree:referenced(field) then
-    local item = tree:add(field, value):set_generated()
-    if visible and unit then
-      item:append_text(unit)
-    end
-  end
-end
-
-local function header(field, offset, length)
-  if tree:referenced(field) then
-    tree:add(field, tvb(at + offset, length))
-  end
-end
-
-local made = out.made
-
--- Head and tail of 13 bytes A5 . . 08: what a damaged frame shows too.
-local function show_frame(status)
-  made(fields.dialect, "a5")
-  header(fields.start, 0, 1)
-  header(fields.address, 1, 1)
-  header(fields.data_id, 2, 1)
-  header(fields.length, 3, 1)
-  header(fields.data, 4, 8)
-  header(fields.checksum, 12, 1)
-  made(fields.checksum_status, status)
-end
-
--- Columns -----------------------------------------------------------------------------------------------------------------
-
-local HOSTS = { [0x40] = "PC", [0x80] = "App", [0x20] = "GPRS" }
-
-local function host_name(address)
-  return format("%s 0x%02X", HOSTS[address] or (address > 0x40 and address <= 0x4F and "PC" or "Host"), address)
-end
-
--- Board that a request names, or that replies; nil where it is not known.
-local function board_of(address)
-  if address >= 0x40 and address <= 0x4F then
-    return address - 0x3F
-  elseif address >= 0x01 and address <= 0x10 then
-    return address
-  end
-  return nil
-end
-
-local function id_words(id)
-  local name = data_ids[id]
-  return name and format("0x%02X %s", id, name) or format("0x%02X", id)
-end
-
--- The constant part of a frame's words, by address * 256 + ID.
-local beginnings, sources, destinations = {}, {}, {}
-
-local function names_of(address, id)
-  local key = address * 256 + id
-  if not beginnings[key] then
-    local board = board_of(address)
-    local who = board and format("board %d", board) or (address >= 0x20 and "any board" or "unknown board")
-    beginnings[key] = format("%s  %s", who, id_words(id))
-    local host = address >= 0x20 and host_name(address) or "Host"
-    local other = board and format("Board %d", board) or (address >= 0x20 and "Board" or format("Board 0x%02X", address))
-    sources[key] = address >= 0x20 and host or other
-    destinations[key] = address >= 0x20 and other or host
-  end
-  return beginnings[key], sources[key], destinations[key]
-end
-
-local function hex_words(raw, first, last)
-  local list = {}
-  for i = first, last do
-    list[#list + 1] = format("%02x", byte(raw, i))
-  end
-  return concat(list, " ")
-end
-
--- Records -----------------------------------------------------------------------------------------------------------------
-
-local frame = {} -- the one at hand, for daly_payload
-
--- An A5 frame: fields, expert notes; returns words, source, destination.
-local function a5(item, raw, slot, again)
-  local results = view.results
-  local address, id = byte(raw, 2, 3)
-  local flag = results.flag[slot]
-  local beginning, source, destination = names_of(address, id)
-  local reply = address < 0x20
-  local text
-  frame.raw = raw
-  if reply then
-    local memory = results.memory[slot]
-    frame.memory = memory
-    frame.cells = id == 0x95 and payload.cells(slot, memory, again) or nil
-    local words = payload.words[id]
-    if words then
-      text = "Reply " .. beginning .. ": " .. words(frame)
-    else
-      text = "Reply " .. beginning .. "  " .. hex_words(raw, 5, 12)
-    end
-  elseif flag == "echo" then
-    text = "Echo " .. beginning
-    source, destination = "Echo", source
-    item:add_proto_expert_info(experts.echo)
-  elseif flag == "retry" then
-    text = "Request " .. beginning .. "  [retry]"
-  else
-    text = "Request " .. beginning
-  end
-  if reply then
-    if id == 0x98 or (frame.memory and frame.memory ~= true and type(frame.memory) == "table") then
-      local complaints = payload.complaints(id, frame)
-      for i = 1, #complaints do
-        item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
-      end
-    end
-  end
-  if not wanted then
-    return text, source, destination
-  end
-  show_frame(1)
-  made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
-  local board = board_of(address)
-  if board then
-    made(fields.board, board)
-  end
-  if flag == "retry" then
-    made(fields.retry, true)
-  end
-  local link = results.link[slot]
-  if link then
-    made(reply and fields.request_in or fields.reply_in, link)
-  end
-  local wait = results.wait[slot]
-  if wait then
-    made(fields.response_time, wait, " s")
-  end
-  if reply and payload.show[id] then
-    payload.show[id](frame, out)
-  end
-  return text, source, destination
-end
-
-local function modbus(item, raw)
-  local address, fn = byte(raw, 1, 2)
-  local dialect = address == 0xD2 and "d2" or "81"
-  if wanted then
-    local length = #raw
-    made(fields.dialect, dialect)
-    header(fields.modbus_address, 0, 1)
-    header(fields.modbus_function, 1, 1)
-    header(fields.undecoded, 2, length - 4)
-    if tree:referenced(fields.modbus_crc) then
-      tree:add_le(fields.modbus_crc, tvb(at + length - 2, 2))
-    end
-    made(fields.modbus_crc_status, 1)
-  end
-  if visible then
-    item:append_text(", Modbus RTU")
-  end
-  return format("Modbus %s  address 0x%02X  function 0x%02X  %d bytes", dialect:upper(), address, fn, #raw)
-end
-
-local WORDS = {
-  bad_checksum = "Bad checksum",
-  short = "Cut-off frame",
-  junk = "Junk",
-}
-
-local function damaged(item, kind, raw, name)
-  local length = #raw
-  if kind == "bad_checksum" then
-    if wanted then
-      show_frame(0)
-    end
-    local address, id = byte(raw, 2, 3)
-    local sum = 0
-    for i = 1, 12 do
-      sum = (sum + byte(raw, i)) % 256
-    end
-    item:add_proto_expert_info(
-      experts.bad_checksum,
-      format("Checksum is 0x%02X, the bytes sum up to 0x%02X", byte(raw, 13), sum)
-    )
-    return format("Bad checksum  address 0x%02X  %s", address, id_words(id))
-  end
-  if wanted then
-    header(fields.undecoded, 0, length)
-  end
-  if kind == "foreign" then
-    if wanted then
-      made(fields.foreign, name)
-    end
-    return format("Not Daly: %s  %d bytes", name, length)
-  elseif kind == "short" then
-    item:add_proto_expert_info(experts.short, format("Frame is cut off after %d bytes", length))
-  else
-    item:add_proto_expert_info(experts.junk, format("%d bytes that are no frame", length))
-  end
-  local shown = hex_words(raw, 1, math.min(length, 16))
-  return format("%s  %d bytes  %s%s", WORDS[kind], length, shown, length > 16 and " ..." or "")
-end
-
-local function event_words(item, text)
-  if visible and text ~= "" then
-    item:append_text(": " .. text)
-  end
-  return text ~= "" and "Event: " .. text or "Event"
-end
-
--- Make an item of the tree for a record. `raw`: its bytes; they stand in buffer at offset.
-local function begin(parent, buffer, offset, length, kind)
-  tvb, at = buffer, offset
-  tree = length > 0 and parent:add(daly, buffer(offset, length)) or parent:add(daly)
-  if wanted then
-    made(fields.kind, kind)
-    made(fields.transport, "uart")
-  end
-  return tree
-end
-
-local function one_record(parent, buffer, raw, item, again)
-  local kind = item.kind
-  local offset, length = item.at, item.length
-  if item.bytes then
-    buffer = ByteArray.new(item.bytes, true):tvb("Daly record")
-    raw, offset, length = item.bytes, 0, #item.bytes
-  else
-    raw = raw:sub(offset + 1, offset + length)
-  end
-  local node = begin(parent, buffer, offset, length, kind)
-  if item.since and wanted then
-    made(fields.began_in, item.since)
-  end
-  local text, source, destination
-  if kind == "frame" and item.dialect == "a5" then
-    text, source, destination = a5(node, raw, item.slot, again)
-  elseif kind == "frame" then
-    text = modbus(node, raw)
-  elseif kind == "event" then
-    local comment = packet_comment()
-    text = event_words(node, comment and tostring(comment.value) or "")
-  else
-    text = damaged(node, kind, raw, item.name)
-  end
-  if visible and kind ~= "event" then
-    node:append_text(", " .. text)
-  end
-  return text, source, destination
-end
-
--- Bytes that begin a record of a later packet.
-local function one_part(parent, buffer, item)
-  local node = parent:add(daly, buffer(item.at, item.length))
-  tree, tvb, at = node, buffer, item.at
-  if wanted then
-    made(fields.continued_in, item.part)
-  end
-  if visible then
-    node:append_text(format(", %d bytes of a record that ends in packet %d", item.length, item.part))
-  end
-  return format("%d bytes, continued in #%d", item.length, item.part)
-end
-
--- Info column: all records of a packet, within reason.
-local MOST_WORDS = 4
-
-local function several(parent, buffer, raw, items, again, pinfo)
-  local texts, source, destination = {}, nil, nil
-  for i = 1, #items do
-    local item, text, from, to = items[i], nil, nil, nil
-    if item.part then
-      text = one_part(parent, buffer, item)
-    else
-      text, from, to = one_record(parent, buffer, raw, item, again)
-    end
-    if i <= MOST_WORDS then
-      texts[i] = text
-    end
-    source, destination = source or from, destination or to
-  end
-  if #items > MOST_WORDS then
-    texts[MOST_WORDS + 1] = format("and %d more", #items - MOST_WORDS)
-  end
-  local cols = pinfo.cols
-  cols.protocol = "Daly"
-  cols.info = concat(texts, " | ")
-  if source then
-    cols.src = source
-    cols.dst = destination
-  end
-end
-
--- Packets -----------------------------------------------------------------------------------------------------------------
+-- Packets -----------------------------------------------------------------------------------------
 
 local handle
 
@@ -514,12 +179,8 @@ function daly.dissector(buffer, pinfo, parent)
   local number = pinfo.number
   local raw = length > 0 and buffer:raw(0, length) or ""
   local again = pinfo.visited or number <= read_to
+  local from = capture
   local whole
-  handle = handle or Dissector.get("daly")
-  wanted = parent:referenced(handle)
-  visible = parent.visible
-
-  view = capture
   if not again then
     read_to = number
     local interface = interface_of(interfaces)
@@ -539,29 +200,21 @@ function daly.dissector(buffer, pinfo, parent)
     end
   else
     if blind then
-      view, again = second_look(number, pinfo.p2p_dir, pinfo.rel_ts, raw)
+      from, again = second_look(number, pinfo.p2p_dir, pinfo.rel_ts, raw)
     end
-    whole = view and view.plans[number] == nil and length == 13 and byte(raw, 1) == 0xA5
+    whole = from and from.plans[number] == nil and length == 13 and raw:byte() == 0xA5
   end
 
+  handle = handle or Dissector.get("daly")
   if whole then
-    local node = begin(parent, buffer, 0, 13, "frame")
-    local text, source, destination = a5(node, raw, number, again)
-    local cols = pinfo.cols
-    cols.protocol = "Daly"
-    cols.info = text
-    cols.src = source
-    cols.dst = destination
-    if visible then
-      node:append_text(", " .. text)
-    end
+    view.look(parent, handle, from.results, again)
+    view.whole(parent, buffer, raw, number, pinfo)
     return length
   end
 
-  local items = view and streams.plan(view, number, again)
+  local items = from and streams.plan(from, number, again)
   if not items then -- nothing is known of it (see second_look; with -R, packets are left out and numbers come twice)
-    view = streams.capture({ baud = 9600 })
-    items = records.alone(raw)
+    from, items = streams.capture({ baud = prefs.baud }), records.alone(raw)
   end
   if handed[number] then
     if has_frame(items) then
@@ -570,11 +223,12 @@ function daly.dissector(buffer, pinfo, parent)
       return length
     end
   end
-  several(parent, buffer, raw, items, again, pinfo)
+  view.look(parent, handle, from.results, again)
+  view.several(parent, buffer, raw, items, pinfo)
   return length
 end
 
--- Doors -------------------------------------------------------------------------------------------------------------------
+-- Doors -------------------------------------------------------------------------------------------
 
 local encapsulations = DissectorTable.get("wtap_encap")
 local claimed = {}

@@ -48,7 +48,7 @@ function M.new(times, results)
   return {
     times = times,
     results = results,
-    state = { last = {}, remembered = 0, waiting = {}, boards = {}, burst = nil },
+    state = { last = {}, remembered = 0, waiting = {}, boards = {}, burst = nil, latest = -math.huge },
     mark = nil, -- see M.mark
   }
 end
@@ -78,7 +78,7 @@ local function feed_request(bus, slot, number, raw, address, id, starts, ends, s
   local state, times = bus.state, bus.times
   local flag
   local before = state.last[raw]
-  if before and not before.answered and starts - before.ended <= times.reply + GRACE then
+  if before and not before.answered and state.latest - before.ended <= times.reply + GRACE then
     local echo
     if side and before.side then
       echo = side ~= before.side
@@ -101,7 +101,7 @@ local function feed_request(bus, slot, number, raw, address, id, starts, ends, s
   if not before then
     state.remembered = state.remembered + 1
     if state.remembered > 512 then
-      forget_old(state, starts, times.reply + 1)
+      forget_old(state, state.latest, times.reply + 1)
     end
   end
   state.last[raw] = request
@@ -110,7 +110,7 @@ local function feed_request(bus, slot, number, raw, address, id, starts, ends, s
     list = {}
     state.waiting[id] = list
   end
-  while list[1] and starts - list[1].ended > times.reply + GRACE do
+  while list[1] and state.latest - list[1].ended > times.reply + GRACE do
     table.remove(list, 1)
   end
   list[#list + 1] = request
@@ -128,9 +128,10 @@ local function answer(bus, number, address, id, starts)
   if not list then
     return nil
   end
+  local latest = bus.state.latest
   for i = #list, 1, -1 do
     local request = list[i]
-    if starts - request.ended <= bus.times.reply + GRACE and (not request.board or request.board == address) then
+    if latest - request.ended <= bus.times.reply + GRACE and (not request.board or request.board == address) then
       table.remove(list, i)
       request.answered = true
       bus.results.link[request.slot] = number
@@ -246,8 +247,12 @@ end
 -- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from.
 function M.feed(bus, slot, number, raw, starts, ends, side, owner)
   local address, id = byte(raw, 2, 3)
-  local results = bus.results
+  local results, state = bus.results, bus.state
   bus.linked = nil
+  -- A clock that steps back does not revive a request.
+  if starts > state.latest then
+    state.latest = starts
+  end
   if address >= 0x20 then
     local flag = feed_request(bus, slot, number, raw, address, id, starts, ends, side)
     if flag then

@@ -1,14 +1,17 @@
 -- SPDX-License-Identifier: GPL-2.0-or-later
 --
--- The eight data bytes of a reply, by data ID (paper, section 3): as fields of the tree, and as a few words for the Info
+-- The eight data bytes of a reply, by data ID (paper, section 3): as fields of the tree, and as words for the Info
 -- column. All numbers of several bytes are big-endian.
 --
 --   M.show[id](frame, out)     adds the fields
 --   M.words[id](frame)         returns the words
 --
--- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, cells = table of all cells or nil }; data byte 0 is the
--- fifth byte of raw. `out` adds: out.bytes(field, byte, length, unit) the bytes as they are; out.value(field, byte, length, value,
--- unit) a value computed from them; out.made(field, value, unit) a generated one.
+-- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, cells = table of all cells or nil }; data
+-- byte 0 is the fifth byte of raw. `out` adds:
+--
+--   out.bytes(field, byte, length, unit)            the bytes as they are
+--   out.value(field, byte, length, value, unit)     a value computed from them
+--   out.made(field, value, unit)                    a generated one
 
 local fields = require("daly_fields").fields
 local data_ids = require("daly_fields")
@@ -245,14 +248,8 @@ words[0x95] = function(frame)
   local cells = frame.cells
   if cells then
     local lowest, highest, average = statistics(cells)
-    list[#list + 1] = format(
-      " all %d: min %d  max %d  average %.0f  spread %d mV",
-      #cells,
-      lowest,
-      highest,
-      average,
-      highest - lowest
-    )
+    list[#list + 1] =
+      format(" all %d: min %d  max %d  average %.0f  spread %d mV", #cells, lowest, highest, average, highest - lowest)
   end
   return concat(list, " ")
 end

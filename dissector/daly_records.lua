@@ -23,7 +23,7 @@ local LONGEST_RUN = 4096
 local REACH = 260
 
 -- Whether W, a good A5 window buf[s..e], is a frame: true, false, or nil when the bytes to tell are not there.
--- A window that holds the start of another good one is a frame only if a good frame, or the end, follows (records.md 3).
+-- A window that holds the start of another good one is a frame only if a good frame, or the end, follows (rule 3).
 local function stands(buf, s, e, n, final)
   local inner_good, inner_open = false, false
   local q = find(buf, "\xA5", s + 1, true)
@@ -55,8 +55,8 @@ local function stands(buf, s, e, n, final)
   return false
 end
 
--- The next frame in buf[from..n]: first position, last position, dialect. Or nil, the position before which no window can begin
--- any more, and whether a good window waits for its neighbour's bytes.
+-- The next frame in buf[from..n]: first position, last position, dialect. Or nil, the position before which no window
+-- can begin any more, and whether a good window waits for its neighbour's bytes.
 local function next_frame(buf, from, n, final)
   local refused
   while true do

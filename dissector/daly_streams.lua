@@ -3,14 +3,14 @@
 -- Packets in, records out: which records end in which packet, however the stream was cut (docs/records.md 1 to 4, 10).
 -- Pure Lua, no Wireshark: a packet is a number, a time (s) and a string.
 --
--- The capture is read once in order (`first`); what was found is kept, and any packet can then be looked up again in any
--- order (`again`). An ordinary packet - one whole frame, nothing held before or behind it - keeps nothing here at all.
+-- The capture is read once in order (`first`); what was found is kept, and packets can then be looked up in any order
+-- (`plan`). An ordinary packet - one whole frame, nothing held before or behind it - keeps nothing here at all.
 --
 -- A plan is what a packet shows. Its items, in order:
 --
 --   { kind =, at =, length =, dialect =, name =, slot =, bytes =, since = }
---       a record that ends here; at: offset in the packet (0: its first byte); one that began in an earlier packet has its
---       whole `bytes`, and `since`, the number of that packet
+--       a record that ends here; at: offset in the packet (0: its first byte); one that began in an earlier packet has
+--       its whole `bytes`, and `since`, the number of that packet
 --   { part = number, at =, length = }   bytes of a record that ends in packet `number`
 
 local records = require("daly_records")
@@ -73,13 +73,28 @@ local function packet_at(packets, position, from)
   end
 end
 
-local function put(plan, list, item)
-  local items = plan[list]
-  if not items then
-    items = {}
-    plan[list] = items
+-- Longest junk record (docs/records.md 4).
+local LONGEST_RUN = 4096
+
+-- Append an item. A long gap may be given out in the middle of a packet: its two pieces of junk are shown as one.
+local function append(items, item)
+  local before = items[#items]
+  if
+    before
+    and before.kind == "junk"
+    and item.kind == "junk"
+    and before.at + before.length == item.at
+    and before.length + item.length <= LONGEST_RUN
+  then
+    items[#items] = { kind = "junk", at = before.at, length = before.length + item.length }
+  else
+    items[#items + 1] = item
   end
-  items[#items + 1] = item
+end
+
+local function put(plan, list, item)
+  plan[list] = plan[list] or {}
+  append(plan[list], item)
 end
 
 -- Lay one record out over the packets it lies in; returns the item of the packet in which it ends.
@@ -335,7 +350,7 @@ function M.plan(capture, number, again)
     all[i] = items[i]
   end
   for i = 1, #held do
-    all[#all + 1] = held[i]
+    append(all, held[i])
   end
   return all
 end

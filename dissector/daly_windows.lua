@@ -102,7 +102,7 @@ local function modbus_address(address)
   return nil
 end
 
--- The lengths, shortest first, that a Modbus frame beginning at p can have by the bytes up to n, or nil where the header
+-- The lengths, shortest first, that a Modbus frame beginning at p can have by the bytes up to n; nil where the header
 -- is not there yet (then anything is possible).
 local function modbus_lengths(buf, p, n)
   local dialect, asks, answers = modbus_address(byte(buf, p))

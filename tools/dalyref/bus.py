@@ -58,6 +58,7 @@ class Bus:
     def frame(self, located: Located, data: bytes, fields: Fields) -> Slate:
         """Take an A5 frame: add what it means to its `fields`, and to those of records before it."""
         slate = Slate(fields, self)
+        self._exchange.pass_time(located.start_ns)
         if addresses.is_request(data[1]):
             self._request(located, data, slate)
         else:
@@ -102,7 +103,7 @@ class Bus:
 
     def _answer(self, located: Located, data_id: int, board: int, slate: Slate) -> int:
         """Find the request of a reply; return its number, 0: none."""
-        request = self._exchange.answer(data_id, board, located.start_ns)
+        request = self._exchange.answer(data_id, board)
         if request is None:
             return 0
         fields = slate.fields

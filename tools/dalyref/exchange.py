@@ -50,6 +50,14 @@ class Exchange(Generic[T]):
         self._echo_ns = options.limit_ns(options.echo)
         self._newest: dict[bytes, Request[T]] = {}
         self._waiting: dict[int, list[Request[T]]] = {}
+        self._latest_ns = 0
+
+    def pass_time(self, start_ns: int) -> None:
+        """Take the beginning of any frame of the bus: a clock that steps back does not revive a request."""
+        self._latest_ns = max(self._latest_ns, start_ns)
+
+    def _waits(self, request: Request[T]) -> bool:
+        return self._latest_ns - request.end_ns <= self._wait_ns
 
     def ask(
         self, frame: bytes, number: int, start_ns: int, end_ns: int, *, side: Direction, owner: T
@@ -57,7 +65,7 @@ class Exchange(Generic[T]):
         """Take a frame from a host: return (``addresses.REQUEST`` or ``ECHO``, whether it is a retry)."""
         before = self._newest.pop(frame, None)
         retry = False
-        if before is not None and not before.answered and start_ns - before.end_ns <= self._wait_ns:
+        if before is not None and not before.answered and self._waits(before):
             if before.side and side:
                 echo = before.side != side
             else:
@@ -77,14 +85,14 @@ class Exchange(Generic[T]):
             del waiting[0]
         return addresses.REQUEST, retry
 
-    def answer(self, data_id: int, board: int, start_ns: int) -> Request[T] | None:
+    def answer(self, data_id: int, board: int) -> Request[T] | None:
         """Take a reply: return the request it belongs to, which then waits no more."""
         waiting = self._waiting.get(data_id)
         if not waiting:
             return None
         for index in range(len(waiting) - 1, -1, -1):
             request = waiting[index]
-            if start_ns - request.end_ns <= self._wait_ns and request.only in (0, board):
+            if self._waits(request) and request.only in (0, board):
                 request.answered = True
                 del waiting[index]
                 return request

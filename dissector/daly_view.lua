@@ -1,0 +1,380 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- How records look: an item of the tree each, with its fields and expert notes, and the words of the columns.
+
+local field_module = require("daly_fields")
+local payload = require("daly_payload")
+
+local M = {}
+
+local fields, experts, data_ids = field_module.fields, field_module.experts, field_module.DATA_IDS
+
+local byte, format, concat = string.byte, string.format, table.concat
+
+local packet_comment = Field.new("frame.comment")
+
+-- The packet at hand: our protocol; what is known of its frames (daly_bus); whether anybody asked for a field of ours,
+-- and whether somebody looks at the tree; whether the capture was read to its end.
+local daly, results, wanted, visible, again
+
+--- Once: the protocol, which the items of the tree belong to.
+function M.setup(proto)
+  daly = proto
+end
+
+--- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
+-- capture was read to its end.
+function M.look(parent, handle, known, read)
+  wanted, visible = parent:referenced(handle), parent.visible
+  results, again = known, read
+end
+
+-- Tree --------------------------------------------------------------------------------------------
+
+-- The record at hand: its item of the tree, and where its bytes stand.
+local tree, tvb, at
+
+local out = {}
+
+function out.bytes(field, first, length, unit)
+  if tree:referenced(field) then
+    local item = tree:add(field, tvb(at + 4 + first, length))
+    if visible and unit then
+      item:append_text(unit)
+    end
+  end
+end
+
+function out.value(field, first, length, value, unit)
+  if tree:referenced(field) then
+    local item = tree:add(field, tvb(at + 4 + first, length), value)
+    if visible and unit then
+      item:append_text(unit)
+    end
+  end
+end
+
+function out.little(field, first, length)
+  if tree:referenced(field) then
+    tree:add_le(field, tvb(at + 4 + first, length))
+  end
+end
+
+function out.cell(field, first, length, number, unit)
+  if tree:referenced(field) then
+    local item = tree:add(field, tvb(at + 4 + first, length))
+    if visible then
+      item:prepend_text(format("Cell %d: ", number)):append_text(unit)
+    end
+  end
+end
+
+function out.made(field, value, unit)
+  if tree:referenced(field) then
+    local item = tree:add(field, value):set_generated()
+    if visible and unit then
+      item:append_text(unit)
+    end
+  end
+end
+
+local function header(field, offset, length)
+  if tree:referenced(field) then
+    tree:add(field, tvb(at + offset, length))
+  end
+end
+
+local made = out.made
+
+-- Head and tail of 13 bytes A5 . . 08: what a damaged frame shows too.
+local function show_frame(status)
+  made(fields.dialect, "a5")
+  header(fields.start, 0, 1)
+  header(fields.address, 1, 1)
+  header(fields.data_id, 2, 1)
+  header(fields.length, 3, 1)
+  header(fields.data, 4, 8)
+  header(fields.checksum, 12, 1)
+  made(fields.checksum_status, status)
+end
+
+-- Columns -----------------------------------------------------------------------------------------
+
+local HOSTS = { [0x40] = "PC", [0x80] = "App", [0x20] = "GPRS" }
+
+local function host_name(address)
+  return format("%s 0x%02X", HOSTS[address] or (address > 0x40 and address <= 0x4F and "PC" or "Host"), address)
+end
+
+-- Board that a request names, or that replies; nil where it is not known.
+local function board_of(address)
+  if address >= 0x40 and address <= 0x4F then
+    return address - 0x3F
+  elseif address >= 0x01 and address <= 0x10 then
+    return address
+  end
+  return nil
+end
+
+local function id_words(id)
+  local name = data_ids[id]
+  return name and format("0x%02X %s", id, name) or format("0x%02X", id)
+end
+
+-- The constant part of a frame's words, by address * 256 + ID.
+local beginnings, sources, destinations = {}, {}, {}
+
+local function names_of(address, id)
+  local key = address * 256 + id
+  if not beginnings[key] then
+    local board = board_of(address)
+    local who = board and format("board %d", board) or (address >= 0x20 and "any board" or "unknown board")
+    beginnings[key] = format("%s  %s", who, id_words(id))
+    local host = address >= 0x20 and host_name(address) or "Host"
+    local other = board and format("Board %d", board)
+      or (address >= 0x20 and "Board" or format("Board 0x%02X", address))
+    sources[key] = address >= 0x20 and host or other
+    destinations[key] = address >= 0x20 and other or host
+  end
+  return beginnings[key], sources[key], destinations[key]
+end
+
+local function hex_words(raw, first, last)
+  local list = {}
+  for i = first, last do
+    list[#list + 1] = format("%02x", byte(raw, i))
+  end
+  return concat(list, " ")
+end
+
+-- Records -----------------------------------------------------------------------------------------
+
+local frame = {} -- the one at hand, for daly_payload
+
+-- An A5 frame: fields, expert notes; returns words, source, destination.
+local function a5(item, raw, slot)
+  local address, id = byte(raw, 2, 3)
+  local flag = results.flag[slot]
+  local beginning, source, destination = names_of(address, id)
+  local reply = address < 0x20
+  local text
+  frame.raw = raw
+  if reply then
+    local memory = results.memory[slot]
+    frame.memory = memory
+    frame.cells = id == 0x95 and payload.cells(slot, memory, again) or nil
+    local words = payload.words[id]
+    if words then
+      text = "Reply " .. beginning .. ": " .. words(frame)
+    else
+      text = "Reply " .. beginning .. "  " .. hex_words(raw, 5, 12)
+    end
+  elseif flag == "echo" then
+    text = "Echo " .. beginning
+    source, destination = "Echo", source
+    item:add_proto_expert_info(experts.echo)
+  elseif flag == "retry" then
+    text = "Request " .. beginning .. "  [retry]"
+  else
+    text = "Request " .. beginning
+  end
+  if reply then
+    if id == 0x98 or (frame.memory and frame.memory ~= true and type(frame.memory) == "table") then
+      local complaints = payload.complaints(id, frame)
+      for i = 1, #complaints do
+        item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
+      end
+    end
+  end
+  if not wanted then
+    return text, source, destination
+  end
+  show_frame(1)
+  made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
+  local board = board_of(address)
+  if board then
+    made(fields.board, board)
+  end
+  if flag == "retry" then
+    made(fields.retry, true)
+  end
+  local link = results.link[slot]
+  if link then
+    made(reply and fields.request_in or fields.reply_in, link)
+  end
+  local wait = results.wait[slot]
+  if wait then
+    made(fields.response_time, wait, " s")
+  end
+  if reply and payload.show[id] then
+    payload.show[id](frame, out)
+  end
+  return text, source, destination
+end
+
+local function modbus(item, raw)
+  local address, fn = byte(raw, 1, 2)
+  local dialect = address == 0xD2 and "d2" or "81"
+  if wanted then
+    local length = #raw
+    made(fields.dialect, dialect)
+    header(fields.modbus_address, 0, 1)
+    header(fields.modbus_function, 1, 1)
+    header(fields.undecoded, 2, length - 4)
+    if tree:referenced(fields.modbus_crc) then
+      tree:add_le(fields.modbus_crc, tvb(at + length - 2, 2))
+    end
+    made(fields.modbus_crc_status, 1)
+  end
+  if visible then
+    item:append_text(", Modbus RTU")
+  end
+  return format("Modbus %s  address 0x%02X  function 0x%02X  %d bytes", dialect:upper(), address, fn, #raw)
+end
+
+local WORDS = {
+  bad_checksum = "Bad checksum",
+  short = "Cut-off frame",
+  junk = "Junk",
+}
+
+local function damaged(item, kind, raw, name)
+  local length = #raw
+  if kind == "bad_checksum" then
+    if wanted then
+      show_frame(0)
+    end
+    local address, id = byte(raw, 2, 3)
+    local sum = 0
+    for i = 1, 12 do
+      sum = (sum + byte(raw, i)) % 256
+    end
+    item:add_proto_expert_info(
+      experts.bad_checksum,
+      format("Checksum is 0x%02X, the bytes sum up to 0x%02X", byte(raw, 13), sum)
+    )
+    return format("Bad checksum  address 0x%02X  %s", address, id_words(id))
+  end
+  if wanted then
+    header(fields.undecoded, 0, length)
+  end
+  if kind == "foreign" then
+    if wanted then
+      made(fields.foreign, name)
+    end
+    return format("Not Daly: %s  %d bytes", name, length)
+  elseif kind == "short" then
+    item:add_proto_expert_info(experts.short, format("Frame is cut off after %d bytes", length))
+  else
+    item:add_proto_expert_info(experts.junk, format("%d bytes that are no frame", length))
+  end
+  local shown = hex_words(raw, 1, math.min(length, 16))
+  return format("%s  %d bytes  %s%s", WORDS[kind], length, shown, length > 16 and " ..." or "")
+end
+
+local function event_words(item, text)
+  if visible and text ~= "" then
+    item:append_text(": " .. text)
+  end
+  return text ~= "" and "Event: " .. text or "Event"
+end
+
+-- Make an item of the tree for a record. `raw`: its bytes; they stand in buffer at offset.
+local function begin(parent, buffer, offset, length, kind)
+  tvb, at = buffer, offset
+  tree = length > 0 and parent:add(daly, buffer(offset, length)) or parent:add(daly)
+  if wanted then
+    made(fields.kind, kind)
+    made(fields.transport, "uart")
+  end
+  return tree
+end
+
+local function one_record(parent, buffer, raw, item)
+  local kind = item.kind
+  local offset, length = item.at, item.length
+  if item.bytes then
+    buffer = ByteArray.new(item.bytes, true):tvb("Daly record")
+    raw, offset, length = item.bytes, 0, #item.bytes
+  else
+    raw = raw:sub(offset + 1, offset + length)
+  end
+  local node = begin(parent, buffer, offset, length, kind)
+  if item.since and wanted then
+    made(fields.began_in, item.since)
+  end
+  local text, source, destination
+  if kind == "frame" and item.dialect == "a5" then
+    text, source, destination = a5(node, raw, item.slot)
+  elseif kind == "frame" then
+    text = modbus(node, raw)
+  elseif kind == "event" then
+    local comment = packet_comment()
+    text = event_words(node, comment and tostring(comment.value) or "")
+  else
+    text = damaged(node, kind, raw, item.name)
+  end
+  if visible and kind ~= "event" then
+    node:append_text(", " .. text)
+  end
+  return text, source, destination
+end
+
+-- Bytes that begin a record of a later packet.
+local function one_part(parent, buffer, item)
+  local node = parent:add(daly, buffer(item.at, item.length))
+  tree, tvb, at = node, buffer, item.at
+  if wanted then
+    made(fields.continued_in, item.part)
+  end
+  if visible then
+    node:append_text(format(", %d bytes of a record that ends in packet %d", item.length, item.part))
+  end
+  return format("%d bytes, continued in #%d", item.length, item.part)
+end
+
+-- Info column: all records of a packet, within reason.
+local MOST_WORDS = 4
+
+--- A packet of any records and parts of records: items as daly_streams gives them.
+function M.several(parent, buffer, raw, items, pinfo)
+  local texts, source, destination = {}, nil, nil
+  for i = 1, #items do
+    local text, from, to
+    if items[i].part then
+      text = one_part(parent, buffer, items[i])
+    else
+      text, from, to = one_record(parent, buffer, raw, items[i])
+    end
+    if i <= MOST_WORDS then
+      texts[i] = text
+    end
+    source, destination = source or from, destination or to
+  end
+  if #items > MOST_WORDS then
+    texts[MOST_WORDS + 1] = format("and %d more", #items - MOST_WORDS)
+  end
+  local cols = pinfo.cols
+  cols.protocol = "Daly"
+  cols.info = concat(texts, " | ")
+  if source then
+    cols.src = source
+    cols.dst = destination
+  end
+end
+
+--- A packet that is one whole A5 frame, which is the usual one.
+function M.whole(parent, buffer, raw, slot, pinfo)
+  local node = begin(parent, buffer, 0, 13, "frame")
+  local text, source, destination = a5(node, raw, slot)
+  local cols = pinfo.cols
+  cols.protocol = "Daly"
+  cols.info = text
+  cols.src = source
+  cols.dst = destination
+  if visible then
+    node:append_text(", " .. text)
+  end
+end
+
+return M

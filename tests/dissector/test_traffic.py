@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Trouble made on purpose (tests/traffic.py) through both readings: the short form of `make soak`."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import pytest
+
+from bench.soak import likely_bus, trouble, write
+from dalytools.comparison import compare
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from dalytools.tshark import Tshark
+    from tests.traffic import Made
+
+
+@pytest.mark.parametrize("seed", [101, 102, 103])
+@pytest.mark.parametrize("make", [trouble, likely_bus])
+def test_both_readings_agree(tshark: Tshark, make: Callable[[int], Iterator[Made]], seed: int) -> None:
+    path = tshark.home / f"{make.__name__}-{seed}.pcapng"
+    write(path, itertools.islice(make(seed), 4000))
+    path.chmod(0o644)
+    result = compare(tshark, path)
+    assert [str(difference) for difference in result.differences[:5]] == []
+    assert result.records > 3900
+    assert result.kinds["frame"] > 2500
+    if make is trouble:
+        assert min(result.kinds[kind] for kind in ("bad_checksum", "short", "junk", "foreign", "event")) > 5
