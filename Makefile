@@ -6,7 +6,7 @@ RUN_SETUP := @tools/setup.sh run
 DEV_SETUP := @tools/setup.sh dev
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format matrix soak bench samples wheel clean
+.PHONY: help setup run test lint format matrix soak bench samples docs wheel clean
 MAKEFLAGS += --no-builtin-rules
 
 help: ## show this list
@@ -45,6 +45,10 @@ bench: ## speed and memory, beside named peers
 samples: ## make pcap_samples/ again
 	$(DEV_SETUP)
 	@$(PY) pcap_samples/make_samples.py
+
+docs: ## write docs/fields.md again, from the dissector
+	$(DEV_SETUP)
+	@$(PY) docs/make_fields.py
 
 wheel: ## build dist/*.whl and dist/*.tar.gz
 	$(DEV_SETUP)

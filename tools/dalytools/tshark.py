@@ -149,6 +149,16 @@ class Tshark:
                 raise
         return subprocess.CompletedProcess(words, process.returncode, output, messages)
 
+    def fields(self) -> list[tuple[str, str, str, str]]:
+        """Return the fields of our protocol, in its order: (name in the tree, filter, type, description).
+
+        The type is Wireshark's, such as ``FT_UINT16``; expert notes are fields of type ``FT_NONE``, in no order.
+        """
+        # -G serves as the first word only.
+        listing = self._run([self._program, "-G", "fields", "-X", f"lua_script:{self._lua}"])
+        rows = [line.split("\t") for line in listing.stdout.decode(errors="replace").splitlines()]
+        return [(row[1], row[2], row[3], row[7]) for row in rows if len(row) > 7 and row[0] == "F" and row[4] == "daly"]
+
     @property
     def _lua(self) -> Path:
         return self._home / "lua" / "daly.lua"
