@@ -75,13 +75,14 @@ end
 
 local function double(name, description)
   return function(abbreviation)
-    return ProtoField.double(abbreviation, name, nil, description)
+    -- The short constructor's arguments differ between versions.
+    return ProtoField.new(name, abbreviation, ftypes.DOUBLE, nil, base.NONE, nil, description)
   end
 end
 
 local function text(name, description)
   return function(abbreviation)
-    return ProtoField.string(abbreviation, name, base.UNICODE, description)
+    return ProtoField.new(name, abbreviation, ftypes.STRING, nil, base.NONE, nil, description)
   end
 end
 

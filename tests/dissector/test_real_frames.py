@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from tests.dissector.dissection import Dissect, P, Row, kinds, number, numbers
@@ -80,7 +80,7 @@ def test_values_are_those_of_the_source(seen: dict[str, Row], key: str) -> None:
         return
     for name, value in expected.items():
         if name in NAMES:
-            wanted: list[float] = [float(one) for one in (value if isinstance(value, list) else [value])]
+            wanted = cast("list[float]", value if isinstance(value, list) else [value])
             assert numbers(row, NAMES[name]) == pytest.approx(wanted, abs=1e-9), name
         else:
             assert name in WORDS | OF_REQUESTS, f"{name} is expected and not looked at"

@@ -7,15 +7,16 @@ import itertools
 from typing import TYPE_CHECKING
 
 import pytest
-
 from bench.soak import likely_bus, trouble, write
+
 from dalytools.comparison import compare
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from dalytools.tshark import Tshark
     from tests.traffic import Made
+
+    from dalytools.tshark import Tshark
 
 
 @pytest.mark.parametrize("seed", [101, 102, 103])

@@ -28,7 +28,7 @@ from typing import IO, TYPE_CHECKING, Any, Self
 from dalytools.problem import Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from types import TracebackType
 
 ORDINARY_USER = 65534  # nobody
@@ -128,6 +128,23 @@ class Tshark:
         """Start tshark with these arguments; streams: stdin, stdout, stderr and the like, as for Popen."""
         return self._start(self.command(*arguments), **streams)
 
+    @property
+    def program(self) -> str:
+        """Path of this tshark."""
+        return self._program
+
+    def start_program(
+        self, words: Sequence[str], *, environment: Mapping[str, str] | None = None, **streams: Any
+    ) -> subprocess.Popen[bytes]:
+        """Start any program as this tshark is started: as an ordinary user, away from the user's own settings.
+
+        environment: what is set otherwise for it.
+        """
+        surroundings = self._surroundings()
+        surroundings["env"] |= environment or {}
+        started: Any = subprocess.Popen(list(words), **surroundings, **streams)  # noqa: S603 - our words, no shell
+        return started
+
     def start_bare(self, arguments: Sequence[str], **streams: Any) -> subprocess.Popen[bytes]:
         """Start tshark in the same surroundings without our dissector: a measure for it."""
         return self._start([self._program, "-n", *arguments], **streams)
@@ -183,21 +200,21 @@ class Tshark:
 
     def _prove(self, proof: Path) -> None:
         try:
-            first = self.run("-r", str(proof), "-T", "fields", "-e", "daly.kind", "-e", "daly.soc")
+            first = self.run("-r", str(proof), "-T", "fields", "-e", "daly.kind", "-e", "_ws.expert.message")
             version = self._run([self._program, "--version"])
         except OSError as error:
             raise Problem(f"{self._program} does not start: {error.strerror}") from None
         self.version = _version(version.stdout.decode(errors="replace"))
-        if first.stdout.split() == [b"frame", b"frame", b"50"]:
+        if first.stdout.split() == [b"frame", b"frame"]:
             return
         messages = first.stderr.decode(errors="replace")
-        complaint = lua_complaint(messages)
+        complaint = lua_complaint(messages) or lua_complaint(first.stdout.decode(errors="replace"))
         if complaint:
-            raise Problem(f"tshark {self.version} does not load our dissector: {complaint}; install dalyshark again")
+            raise Problem(f"our dissector breaks in tshark {self.version}: {complaint}; install dalyshark again")
         said = messages.strip().splitlines()
+        why = said[-1] if said and "daly.kind" not in messages else "it ignores Lua scripts"
         raise Problem(
-            f"tshark {self.version} does not load our dissector: {said[-1] if said else 'it ignores Lua scripts'}; "
-            "is it built with Lua (tshark --version tells)?"
+            f"tshark {self.version} does not load our dissector: {why}; is it built with Lua (tshark --version tells)?"
         )
 
     def _surroundings(self) -> dict[str, Any]:
