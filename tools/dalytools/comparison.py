@@ -253,7 +253,7 @@ def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[i
         dissector.close(last_seen)
         reference.close(last_seen)
         _compare_rest(dissector, reference, result)
-        if len(dissector.pieces) != len(reference.pieces):
+        if len(dissector.pieces) != len(reference.pieces) and not result.found:  # else its cause is named
             shown, told = (f"{len(side.pieces)} more stretches of bytes" for side in (dissector, reference))
             result.add(Difference(last_seen, "bytes before", shown, told))
 
