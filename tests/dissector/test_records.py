@@ -103,13 +103,21 @@ def test_kinds(seen: dict[str, list[str]], name: str) -> None:
 
 
 def test_a_frame_in_a_frame_is_taken_when_a_frame_follows(dissect: Dissect) -> None:
-    """W, then the rest of V which begins a good frame of its own: both readings are possible, W's wins."""
-    w = bytes.fromhex("a5409008 000000000000 a501 23".replace(" ", ""))
-    assert sum(w[:12]) & 0xFF == w[12]
-    follow = bytearray.fromhex("a5019008021000007530 01f4ea".replace(" ", ""))
-    rows = dissect([P((w + follow).hex())])
-    assert kinds(rows) == ["frame+frame"]
-    assert numbers(rows[0], "soc") == [50.0]
+    """W holds the beginning of V, and both are good; but a good frame F begins where W ends, so W stands.
+
+    W  A5 40 90 08 00 00 A5 01 90 08 00 00 sum
+    V                    A5 01 90 08 00 00 sum A5 01 91 08 00 d1    d1 is V's sum
+    F                                          A5 01 91 08 00 d1 ..
+    """
+    head = bytes.fromhex("a54090080000a50190080000")
+    w = head + bytes((sum(head) & 0xFF,))
+    v = w[6:] + bytes.fromhex("a501910800")
+    f = bytes.fromhex(a5(0x01, 0x91, f"00{sum(v) & 0xFF:02x}0108"))
+    assert sum((w + f)[6:18]) & 0xFF == (w + f)[18]
+    rows = dissect([P((w + f).hex()), P((w + f[:6]).hex(), 10)])
+    assert kinds(rows) == ["frame+frame", "short+frame"]
+    assert numbers(rows[0], "data_id") == [0x90, 0x91]
+    assert numbers(rows[1], "address") == [0x01]
 
 
 @pytest.mark.parametrize(("quiet", "expected"), [(0.24, ["", "frame"]), (0.26, ["short", "junk"])])
