@@ -265,12 +265,6 @@ def test_a_disk_that_fills_up(bus: Bus, tmp_path: Path) -> None:
     assert found, watch.err
 
 
-def test_a_port_that_is_not_there_leaves_nothing_behind(tmp_path: Path) -> None:
-    watch = Watch("/dev/ttyUSB77", cwd=tmp_path)
-    watch.end(2)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_busy_port(bus: Bus, tmp_path: Path) -> None:
     first = Watch(bus.port, "-w", tmp_path / "1")
     first.until("Listening")
