@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 from tests.dissector.dissection import FRAME_S, Dissect, P, a5, kinds, numbers
+from tests.traffic import with_crc
 
 ASK = a5(0x40, 0x90)
 ANSWER = "a501900802100000753001f4ea"  # tano-90-1: 52.8 V, 0 A, 50 %
@@ -118,6 +119,26 @@ def test_a_frame_in_a_frame_is_taken_when_a_frame_follows(dissect: Dissect) -> N
     assert kinds(rows) == ["frame+frame", "short+frame"]
     assert numbers(rows[0], "data_id") == [0x90, 0x91]
     assert numbers(rows[1], "address") == [0x01]
+
+
+def test_of_two_windows_that_end_together_the_one_that_begins_first(dissect: Dissect) -> None:
+    """A read reply whose end is an exception, byte for byte: the two bytes before it bring the CRC back to its start.
+
+    51 03 08 | a b 00 00 00 | 51 83 02 | crc of both
+    """
+    tail = with_crc(bytes.fromhex("518302"))
+    for guess in range(1 << 16):
+        head = bytes.fromhex("510308000000") + guess.to_bytes(2, "big")
+        if with_crc(head)[-2:] == b"\xff\xff":
+            break
+    else:
+        pytest.fail("no such pair of bytes")
+    both = head + tail
+    assert with_crc(both[:-2]) == both
+    rows = dissect([P(both.hex()), P(tail.hex(), 10)])
+    assert kinds(rows) == ["frame", "frame"]
+    assert numbers(rows[0], "modbus.function") == [0x03]
+    assert numbers(rows[1], "modbus.function") == [0x83]
 
 
 @pytest.mark.parametrize(("quiet", "expected"), [(0.24, ["", "frame"]), (0.26, ["short", "junk"])])
