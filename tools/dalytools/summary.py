@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
+from dalytools.terminal_text import counted
 
 if TYPE_CHECKING:
     from dalyref.decoder import Decoded
@@ -99,7 +100,7 @@ class Summary:
         kinds = ", ".join(f"{count} {_kind_name(kind)}" for kind, count in self.kinds.most_common())
         out = [f"Records      {self.records}: {kinds}" if self.records else "Records      none"]
         if self._modbus:
-            out.append(f"Modbus       {self._modbus} frames (their registers are not decoded yet)")
+            out.append(f"Modbus       {counted(self._modbus, 'frame')} (their registers are not decoded yet)")
         for name, count in self._foreign.items():
             out.append(f"Not Daly     {name}: {count}")
         out += self._requests()
@@ -111,7 +112,8 @@ class Summary:
         if not self._asked:
             return []
         asked, unanswered = self._asked.total(), self._unanswered.total()
-        text = f"Requests     {asked}, {unanswered} unanswered, {self._retries} retries, {self._echoes} echoes"
+        retries, echoes = counted(self._retries, "retry", "retries"), counted(self._echoes, "echo", "echoes")
+        text = f"Requests     {asked}, {unanswered} unanswered, {retries}, {echoes}"
         out = [text]
         if unanswered:
             worst = [(key, count) for key, count in self._unanswered.most_common(5) if count]
@@ -123,7 +125,7 @@ class Summary:
 def _board_lines(address: int, board: _BoardSeen) -> list[str]:
     name = f"Board {address}" if 1 <= address <= 16 else f"Board 0x{address:02X}"
     ids = " ".join(f"{data_id:02X}" for data_id in sorted(board.ids))
-    out = [f"{name:<12} {board.ids.total()} replies; IDs {ids}"]
+    out = [f"{name:<12} {counted(board.ids.total(), 'reply', 'replies')}; IDs {ids}"]
     newest = board.newest
     if "daly.pack.voltage" in newest:
         state = newest.get("daly.pack.state")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dalytools.comparison import Comparison, compare
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
-from dalytools.terminal_text import plain
+from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark
 
 if TYPE_CHECKING:
@@ -60,19 +60,14 @@ def show(name: str, result: Comparison, *, quiet: bool = False) -> None:
     """Print what came out for one file."""
     if not quiet or result.found:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(result.kinds.items(), key=lambda item: -item[1]))
-        print(f"{plain(name)}: {result.records} records ({kinds}): {counted(result.found)}")  # noqa: T201
+        print(f"{plain(name)}: {counted(result.records, 'record')} ({kinds}): {counted(result.found, 'difference')}")  # noqa: T201
     for difference in result.differences[:SHOWN]:
         print(f"  {plain(str(difference))}")  # noqa: T201
     if result.found > SHOWN:
         print(f"  and {result.found - SHOWN} more")  # noqa: T201
 
 
-def counted(differences: int) -> str:
-    """Say how many differences."""
-    return "1 difference" if differences == 1 else f"{differences} differences"
-
-
 def sum_up(files: int, records: int, differences: int, version: str) -> str:
     """Say in a line what was compared."""
-    what = "1 file" if files == 1 else f"{files} files"
-    return f"{what}, {records} records, tshark {version}: {counted(differences)}"
+    what = f"{counted(files, 'file')}, {counted(records, 'record')}"
+    return f"{what}, tshark {version}: {counted(differences, 'difference')}"

@@ -28,13 +28,13 @@ from dalycapture.reader import read_capture
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalyref.decoder import decode
 from dalytools import __version__
-from dalytools.commands.check import SHOWN, counted
+from dalytools.commands.check import SHOWN
 from dalytools.comparison import compare
 from dalytools.live_view import LiveView
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.summary import Summary
-from dalytools.terminal_text import plain
+from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark, dissector_folder
 
 if TYPE_CHECKING:
@@ -257,8 +257,8 @@ def _checked(tshark: Tshark, path: Path) -> int:
         print(f"\nCheck: left out, as you wish; later: dalyshark check {path}")  # noqa: T201
         return 0
     print(  # noqa: T201
-        f"\nCheck: dissector (tshark {tshark.version}) against reference decoder, {result.records} records: "
-        f"{counted(result.found)}"
+        f"\nCheck: dissector (tshark {tshark.version}) against reference decoder, "
+        f"{counted(result.records, 'record')}: {counted(result.found, 'difference')}"
     )
     for difference in result.differences[:SHOWN]:
         print(f"  {plain(str(difference))}")  # noqa: T201
