@@ -38,8 +38,9 @@ from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark, dissector_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable
 
+    from dalytools.simulator.live import SimulatedBus
     from dalytools.simulator.scenario import Scenario
 
 SIMULATED_S = 20.0
@@ -81,10 +82,10 @@ def run(args: argparse.Namespace) -> int:
         path = _output(args.output)
         screen = _Screen()
         with Tshark() as tshark:
-            with _bus(args.port, args.baud) as (port_name, simulated):
-                if simulated and args.duration is None:
-                    args.duration = SIMULATED_S
-                tally = _watch(args, tshark, screen, port_name, path)
+            bus = None if args.port else _simulated_bus(args.baud)
+            if bus and args.duration is None:
+                args.duration = SIMULATED_S
+            tally = _watch(args, tshark, screen, path, bus)
             if screen.failure:
                 return _unseen(screen.failure, path)
             return _sum_up(tshark, path, tally)
@@ -92,20 +93,16 @@ def run(args: argparse.Namespace) -> int:
         raise Problem(str(error)) from None
 
 
-@contextlib.contextmanager
-def _bus(port: str | None, baud: int) -> Generator[tuple[str, bool]]:
-    """Give the port to listen to, and whether it is a simulated one, which runs as long as this lasts."""
-    if port is not None:
-        yield port, False
-        return
+def _simulated_bus(baud: int) -> SimulatedBus:
+    """Return a bus that is silent until it is entered: nothing is said before somebody listens."""
     from dalytools.simulator.live import SimulatedBus
 
     session = _real_session()
     first = "First a real session is played back, then simulated boards take over." if session else ""
     print(f"No PORT given: a simulated bus. {first}".rstrip())  # noqa: T201
-    with SimulatedBus(_scenario(baud), replay=session) as bus:
-        print(f"Clients can talk to these boards on {bus.client}")  # noqa: T201
-        yield bus.tap, True
+    bus = SimulatedBus(_scenario(baud), replay=session)
+    print(f"Clients can talk to these boards on {bus.client}")  # noqa: T201
+    return bus
 
 
 def _scenario(baud: int) -> Scenario:
@@ -148,8 +145,9 @@ def _output(asked: str | None) -> Path:
     return next(path for name in names if not (path := Path(FOLDER, name)).exists())
 
 
-def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, port_name: str, path: Path) -> Tally:
+def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path, bus: SimulatedBus | None) -> Tally:
     duration: float | None = args.duration
+    port_name: str = bus.tap if bus else args.port
     port = open_port(port_name, args.baud)
     with contextlib.ExitStack() as stack:
         stack.callback(port.close)
@@ -160,7 +158,7 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, port_name:
         view, faults = None, list[str]()
         until = f"for {duration:g} s" if duration else "until Ctrl-C"
         said = plain(f"Listening to {port_name} at {args.baud} baud {until}; writing {path}")
-        print(f"{said}\n", flush=True)  # noqa: T201
+        screen(f"{said}\n")
         if not args.quiet:
 
             def ended(why: str) -> None:
@@ -172,6 +170,10 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, port_name:
             sinks.append(view.sink)
         sniffer = Sniffer(port, interface, sinks, limits=Limits(duration=duration))
         screen.when_gone = sniffer.stop
+        if screen.failure:  # nobody reads already
+            sniffer.stop()
+        if bus:
+            stack.enter_context(bus)
         tally = sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM))
     if view and view.sink.failure:  # `ended` has told it better
         with contextlib.suppress(ValueError):
