@@ -70,6 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         status = run(parser.parse_args(words[1:]))
         sys.stdout.flush()
     except Problem as problem:
+        _let_output_go()
         return _failed(command, str(problem))
     except BrokenPipeError:  # the reader of our standard output went away: `dalyshark decode ... | head`
         _let_output_go()
@@ -78,6 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _let_output_go()
         return _failed(command, f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:
+        _let_output_go()
         return 128 + signal.SIGINT
     return status
 

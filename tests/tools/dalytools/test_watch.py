@@ -50,7 +50,7 @@ class Watch:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
-            env=env,
+            env={name: value for name, value in (env or os.environ).items() if name != "PYTHONUNBUFFERED"},
             cwd=cwd,
         )
         self.lines: list[str] = []
