@@ -139,6 +139,28 @@ def test_several_interfaces_in_two_passes_without_a_filter(dissect: Dissect) -> 
     assert [number(row, "request_in") for row in rows[2:]] == [1, 2]
 
 
+def test_what_a_frame_meant_is_taken_back_when_it_turns_out_to_be_none(dissect: Dissect) -> None:
+    """A cut-off reply and the whole one behind it, cut so that the first 13 bytes sum up right by accident.
+
+    When they are all there is, they are the frame, and answer the request. The rest shows that the reply began later.
+    """
+    whole = bytes.fromhex(ANSWER)
+    head = bytes.fromhex("a50190080000") + whole[:6]
+    first = (whole[6] - sum(head)) & 0xFF
+    window = head[:4] + bytes((first,)) + head[5:] + whole[6:7]
+    assert len(window) == 13
+    assert sum(window[:12]) & 0xFF == window[12]
+    packets = [P(ASK), P(window.hex(), 0.05), P(whole[7:].hex(), 0.05 + FRAME_S), P(a5(0x40, 0x91), 1)]
+    alone = dissect(packets[:2])
+    assert number(alone[0], "reply_in") == 2
+    rows = dissect(packets)
+    assert [row["daly.kind"] for row in rows] == [["frame"], ["short"], ["frame"], ["frame"]]
+    assert number(rows[0], "reply_in") == 3
+    assert number(rows[2], "request_in") == 1
+    assert number(rows[2], "soc") == 50.0
+    assert number(rows[2], "response_time") == pytest.approx(0.05 + 6 * 10 / 9600 - FRAME_S, abs=1e-6)
+
+
 def test_response_time_within_one_packet_is_from_positions(dissect: Dissect) -> None:
     rows = dissect([P(ASK + ANSWER)])
     assert number(rows[0], "response_time") == pytest.approx(0.0, abs=1e-9)
