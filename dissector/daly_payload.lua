@@ -12,6 +12,7 @@
 --   out.bytes(field, byte, length, unit)            the bytes as they are
 --   out.value(field, byte, length, value, unit)     a value computed from them
 --   out.made(field, value, unit)                    a generated one
+--   out.cell, out.made_cell                         the same for a cell's voltage, mV
 
 local fields = require("daly_fields").fields
 local data_ids = require("daly_fields")
@@ -212,14 +213,15 @@ show[0x95] = function(frame, out)
   end
   local real, before = real_slots(burst, frame, 3)
   for i = 0, real - 1 do
-    out.cell(fields.cell_voltage, 1 + 2 * i, 2, before + i + 1, " mV")
+    local high, low = byte(frame.raw, 6 + 2 * i, 7 + 2 * i)
+    out.cell(fields.cell_voltage, 1 + 2 * i, 2, before + i + 1, high * 256 + low)
   end
   out.bytes(fields.reserved, 1 + 2 * real, 7 - 2 * real)
   local cells = frame.cells
   if cells then
     local lowest, highest, average = statistics(cells)
     for i = 1, #cells do
-      out.made(fields.cells_voltage, cells[i], " mV")
+      out.made_cell(fields.cells_voltage, i, cells[i])
     end
     out.made(fields.cells_count, #cells)
     out.made(fields.cells_min, lowest, " mV")

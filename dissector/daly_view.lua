@@ -60,11 +60,21 @@ function out.little(field, first, length)
   end
 end
 
-function out.cell(field, first, length, number, unit)
+-- A cell's voltage, with the cell's number in its label.
+function out.cell(field, first, length, number, value)
   if tree:referenced(field) then
     local item = tree:add(field, tvb(at + 4 + first, length))
     if visible then
-      item:prepend_text(format("Cell %d: ", number)):append_text(unit)
+      item:set_text(format("Cell %d: %d mV", number, value))
+    end
+  end
+end
+
+function out.made_cell(field, number, value)
+  if tree:referenced(field) then
+    local item = tree:add(field, value):set_generated()
+    if visible then
+      item:set_text(format("Cell %d: %d mV", number, value))
     end
   end
 end

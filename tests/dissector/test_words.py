@@ -90,7 +90,7 @@ def test_units_stand_in_the_tree(tshark: Tshark) -> None:
     for line in ("Pack voltage: 53.1 V", "Current: -12.4 A", "Current, raw: 29876", "SOC: 78.3 %"):
         assert line in text
     text = tree(tshark, a5(1, 0x95, "010ec00ec20ec720"))
-    assert "Cell 2: Cell voltage: 3778 mV" in text
+    assert "Cell 2: 3778 mV" in text
 
 
 def tree(tshark: Tshark, frame: str) -> str:
