@@ -147,6 +147,7 @@ end
 -- Packets -----------------------------------------------------------------------------------------
 
 local handle
+local bytes_of = Tvb.raw
 
 -- Whether any of these items is a frame, or a part of one.
 local function has_frame(items)
@@ -175,10 +176,10 @@ local function hand_over(buffer, pinfo, parent)
 end
 
 function daly.dissector(buffer, pinfo, parent)
-  local length = buffer:captured_len()
+  local raw = bytes_of(buffer)
+  local length = #raw
   local number = pinfo.number
-  local raw = length > 0 and buffer:raw(0, length) or ""
-  local again = pinfo.visited or number <= read_to
+  local again = number <= read_to or pinfo.visited
   local from = capture
   local whole
   if not again then

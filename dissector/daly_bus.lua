@@ -7,10 +7,11 @@
 -- frame's slot (a number of its own), so that an ordinary frame costs no table:
 --
 --   flag[slot]     nil, "echo" or "retry"
---   link[slot]     reply: packet number of its request; request: of its first reply (set when that comes)
---   wait[slot]     reply that answers a request: response time, s
+--   link[slot]     reply: packet number of its request; request: of its first reply (set when that comes); else false
+--   wait[slot]     reply that answers a request: response time, s; else false
 --   memory[slot]   0x90 reply: state of the newest 0x93; 0x98: data bytes of the one before;
---                  0x95, 0x96, texts: the burst, or { burst =, missing =, again =, table = } where there is more to say
+--                  0x95, 0x96, texts: the burst (only base and count, where the count is known), or
+--                  { burst =, missing =, again =, table = } where there is more to say; else false
 
 local M = {}
 
@@ -163,6 +164,18 @@ local function note_cells(burst, raw, number)
   return nil
 end
 
+-- What a frame is shown by whose burst has a known count, { base =, count = }: one for all such bursts.
+local shapes = { [0] = {}, [1] = {} }
+
+local function shape_of(base, count)
+  local shape = shapes[base][count]
+  if not shape then
+    shape = { base = base, count = count }
+    shapes[base][count] = shape
+  end
+  return shape
+end
+
 local function feed_burst(bus, slot, number_in_file, raw, address, id, starts, ends)
   local state = bus.state
   local number = byte(raw, 5)
@@ -191,7 +204,7 @@ local function feed_burst(bus, slot, number_in_file, raw, address, id, starts, e
       id = id,
       address = address,
       base = number == 0 and 0 or 1,
-      request = request,
+      request = request and request.number,
       count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil,
       cells = id == 0x95 and {} or nil,
       whole = true, -- every frame from the base on was seen
@@ -208,11 +221,11 @@ local function feed_burst(bus, slot, number_in_file, raw, address, id, starts, e
   end
   burst.number, burst.ended, burst.asked, burst.last = number, ends, nil, slot
   local list = burst.cells and note_cells(burst, raw, number)
-  local memory = burst
+  local memory = burst.count and shape_of(burst.base, burst.count) or burst
   if missing or again or list then
-    memory = { burst = burst, missing = missing, again = again, table = list }
+    memory = { burst = memory, missing = missing, again = again, table = list }
   end
-  return request or burst.request, wait, memory
+  return burst.request, wait, memory
 end
 
 local function feed_reply(bus, slot, number, raw, address, id, starts, ends)
@@ -240,7 +253,7 @@ local function feed_reply(bus, slot, number, raw, address, id, starts, ends)
     board.faults = sub(raw, 5, 12)
   end
   local request, wait = answer(bus, number, address, id, starts)
-  return request, wait, memory
+  return request and request.number, wait, memory
 end
 
 --- One A5 frame. `slot`: the frame's own number for the results; `number`: of its packet; `raw`: its 13 bytes;
@@ -254,22 +267,15 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
     state.latest = starts
   end
   if address >= 0x20 then
+    -- Something for every frame: columns without gaps are lists, which take less room and time.
+    results.link[slot], results.wait[slot], results.memory[slot] = false, false, false
     local flag = feed_request(bus, slot, number, raw, address, id, starts, ends, side)
     if flag then
       results.flag[slot] = flag
     end
   else
     local request, wait, memory = feed_reply(bus, slot, number, raw, address, id, starts, ends)
-    -- No nil is stored: Lua would make room for it.
-    if request then
-      results.link[slot] = request.number
-    end
-    if wait then
-      results.wait[slot] = wait
-    end
-    if memory then
-      results.memory[slot] = memory
-    end
+    results.link[slot], results.wait[slot], results.memory[slot] = request or false, wait or false, memory or false
   end
   local mark = bus.mark
   if mark then
@@ -330,7 +336,7 @@ function M.rewind(bus, owner)
       column[fed.slot] = nil
     end
     if fed.linked then
-      results.link[fed.linked] = nil
+      results.link[fed.linked] = false
     end
     if fed.owner ~= owner then
       others[#others + 1] = fed

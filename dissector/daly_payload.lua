@@ -303,7 +303,12 @@ show[0x97] = function(frame, out)
   out.bytes(fields.reserved, 6, 2)
 end
 
+local NO_BALANCE = ("\0"):rep(6)
+
 words[0x97] = function(frame)
+  if frame.raw:sub(5, 10) == NO_BALANCE then
+    return "none"
+  end
   local list = {}
   for i = 0, 5 do
     local bits = byte(frame.raw, 5 + i)
@@ -312,9 +317,6 @@ words[0x97] = function(frame)
         list[#list + 1] = format("%d", 8 * i + k + 1)
       end
     end
-  end
-  if #list == 0 then
-    return "none"
   end
   local active = byte(frame.raw, 6)
   return "cells " .. concat(list, " ") .. (active ~= 0 and format("  (active balancer: cell %d)", active) or "")
