@@ -25,10 +25,11 @@ from typing import IO, TYPE_CHECKING
 from dalycapture.errors import CaptureError
 from dalycapture.linktype import DALY_LINK_TYPES, TAKEN_LINK_TYPE, link_type_name
 from dalycapture.reader import read_capture
-from dalyref.decoder import Decoded, Decoder
+from dalyref.decoder import Decoded, Decoder, Options
 from dalytools.field_names import FIELD_NAMES
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
+from dalytools.wire_times import preferences
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -96,22 +97,34 @@ class _Rest:
         self.open = ""
 
 
-def compare(tshark: Tshark, path: Path, *, progress: Callable[[int], None] | None = None) -> Comparison:
+def compare(
+    tshark: Tshark, path: Path, *, options: Options | None = None, progress: Callable[[int], None] | None = None
+) -> Comparison:
     """Compare both readings of a capture file.
 
-    progress: called now and then with the number of packets compared. Raises Problem when the file cannot be read at
-    all, or has no packet of a link type of ours. A file that is cut off is compared as far as it goes: ``broken``.
+    options: the constants for both. progress: called now and then with the number of packets compared. Raises Problem
+    when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off is compared as
+    far as it goes: ``broken``.
     """
     _refuse_pipes(path)
     result = Comparison()
     wanted = ",".join(str(number) for number in sorted(_link_types(path, result)))
-    arguments = ["-o", f"daly.link_types:{wanted}", "-r", str(tshark.readable(path)), "-T", "fields"]
+    options = options or Options()
+    arguments = [
+        *preferences(options),
+        "-o",
+        f"daly.link_types:{wanted}",
+        "-r",
+        str(tshark.readable(path)),
+        "-T",
+        "fields",
+    ]
     arguments += ["-E", "separator=/t", "-E", f"aggregator={_BETWEEN_VALUES}", "-E", "quote=n"]
     for name in ("frame.number", *FIELD_NAMES, _LUA_ERROR, _EXPERT):
         arguments += ["-e", name]
     # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
     with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
-        _walk(rows, path, result, progress)
+        _walk(rows, path, Decoder(options), result, progress)
     told = any(difference.field == _LUA_ERROR for difference in result.differences)
     with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
         for row in rows:
@@ -199,9 +212,10 @@ def _packets(path: Path) -> Iterator[Packet]:
         return  # said before, by _link_types
 
 
-def _walk(rows: IO[bytes], path: Path, result: Comparison, progress: Callable[[int], None] | None) -> None:
+def _walk(
+    rows: IO[bytes], path: Path, decoder: Decoder, result: Comparison, progress: Callable[[int], None] | None
+) -> None:
     """Go through both readings together, packet by packet."""
-    decoder = Decoder()
     ready: deque[Decoded] = deque()
     packets = _packets(path)
     streams: dict[int, Key] = {}  # of packets not yet compared

@@ -15,9 +15,12 @@ from dalycapture.output import PipeOutput
 from dalycapture.pcapng import PcapngWriter
 from dalytools.terminal_text import plain
 from dalytools.tshark import Tshark, lua_complaint
+from dalytools.wire_times import preferences
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from dalyref.options import Options
 
 _COLUMNS = 'gui.column.format:"No.","%m","Time","%t","Info","%i"'
 _LINE = re.compile(r" *(\d+) +(-?\d+\.\d+) ?(.*)")
@@ -37,6 +40,7 @@ class LiveView:
         show: Callable[[str], None],
         ended: Callable[[str], None],
         *,
+        options: Options,
         link_type: int,
         application: str,
     ) -> None:
@@ -44,7 +48,7 @@ class LiveView:
         try:
             # Its own process group: Ctrl-C ends the capture, and tshark when it has shown the last record.
             self._process = tshark.start(
-                ["-l", "-r", "-", "-o", f"daly.link_types:{link_type}", "-o", _COLUMNS],
+                ["-l", "-r", "-", *preferences(options), "-o", f"daly.link_types:{link_type}", "-o", _COLUMNS],
                 stdin=reader,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,

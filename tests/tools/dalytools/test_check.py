@@ -11,7 +11,10 @@ import pytest
 from tests.tools.dalytools.made import ANSWER, ASK, SAMPLES, dissector, write
 
 import dalytools.tshark
+from dalycapture.reader import read_capture
+from dalyref.decoder import Options, decode
 from dalytools.cli import main
+from dalytools.comparison import compare
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -131,3 +134,24 @@ def test_what_can_be_read_only_once_is_refused(tmp_path: Path, capsys: pytest.Ca
         assert capsys.readouterr().err == (
             f"dalyshark check: {name} can be read only once, and two readers need it; save it in a file first\n"
         )
+
+
+def test_constants_reach_both_readings(tmp_path: Path) -> None:
+    """At 19200 baud a frame lasts 6.8 ms: the reply begins that much after the request's end, in both."""
+    path = tmp_path / "fast.pcapng"
+    write(path, [(0.0, ASK), (0.05, ANSWER)])
+    with dalytools.tshark.Tshark() as tshark:
+        assert compare(tshark, path, options=Options(baud=19200, reply=0.02)).found == 0
+        assert compare(tshark, path, options=Options(baud=19200)).found == 0
+    slow, fast = (
+        [record.fields.get("daly.response_time") for record in decode(read_capture(path), Options(baud))]
+        for baud in (9600, 19200)
+    )
+    assert slow[1] == pytest.approx(0.05 - 13 * 10 / 9600, abs=1e-6)
+    assert fast[1] == pytest.approx(0.05 - 13 * 10 / 19200, abs=1e-6)
+
+
+def test_constants_are_options(capsys: pytest.CaptureFixture[str]) -> None:
+    sample = str(SAMPLES / "real-poll-cycle.pcapng")
+    assert main(["check", sample, "--baud", "19200", "--silence", "0.1", "--reply", "0.02"]) == 0
+    assert "0 differences" in capsys.readouterr().out

@@ -13,6 +13,7 @@ from tests.tools.dalytools.made import ANSWER, ASK, EPOCH_NS, FRAME_S, dissector
 import dalytools.tshark
 from dalycapture.errors import CaptureError
 from dalycapture.interface import tap
+from dalyref.options import Options
 from dalytools.live_view import LiveView
 from dalytools.tshark import Tshark
 
@@ -25,7 +26,7 @@ def view(data: list[bytes], *, before_end: Callable[[LiveView], None] = lambda _
     shown: list[str] = []
     complaints: list[str] = []
     with Tshark() as tshark:
-        one = LiveView(tshark, shown.append, complaints.append, link_type=147, application="test")
+        one = LiveView(tshark, shown.append, complaints.append, options=Options(), link_type=147, application="test")
         try:
             one.sink.add_interface(tap("/dev/ttyTEST"))
             for number, each in enumerate(data):

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dalytools import wire_times
 from dalytools.comparison import Comparison, compare
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
@@ -31,16 +32,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = "Exit status: 0 no difference, 1 differences, 2 could not run."
     parser.add_argument("files", nargs="+", metavar="FILE", help="capture file (pcapng or pcap)")
     parser.add_argument("-q", "--quiet", action="store_true", help="only what differs and the sum")
+    wire_times.add_arguments(parser, quiet="--silence")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare every file; print a line a file, each difference, and the sum."""
     worst = records = differences = 0
+    options = wire_times.read(args)
     with Tshark() as tshark:
         for name in args.files:
             try:
                 with progress_bar(f"check {plain(Path(name).name)}") as advance:
-                    result = compare(tshark, Path(name), progress=advance)
+                    result = compare(tshark, Path(name), options=options, progress=advance)
             except Problem as problem:
                 print(f"dalyshark check: {plain(str(problem))}", file=sys.stderr)  # noqa: T201
                 worst = 2

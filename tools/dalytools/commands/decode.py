@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import argparse
 import json
-import math
 import os
 import sys
 from contextlib import nullcontext
@@ -17,6 +15,7 @@ from dalycapture.linktype import link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
 from dalyref.packet import SERIAL_LINK_TYPES
+from dalytools import wire_times
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.record_lines import line
@@ -24,6 +23,7 @@ from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
 
 if TYPE_CHECKING:
+    import argparse
     from collections.abc import Callable, Iterator
 
 _COLOURS = {
@@ -53,45 +53,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a line a record for people, or an object a record",
     )
     parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
-    defaults = Options()
-    parser.add_argument("--baud", type=_positive_int, default=defaults.baud, metavar="N", help="for times on the wire")
-    for name, text in (
-        ("quiet", "give an incomplete frame up after so long a silence"),
-        ("echo", "a request repeated within this is an echo"),
-        ("reply", "a request waits so long for its reply"),
-        ("burst", "an answer in several frames ends after so long a silence"),
-    ):
-        default: float = getattr(defaults, name)
-        parser.add_argument(
-            f"--{name}", type=_seconds, default=default, metavar="S", help=f"{text} (seconds, default {default:g})"
-        )
-
-
-def _positive_int(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 1 <= value <= 100_000_000:
-        raise argparse.ArgumentTypeError(f"{text!r} is no baud rate; 9600 is one")
-    return value
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time in seconds; 0.25 is one")
-    return value
+    wire_times.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Decode every file; what could be read of a damaged one is shown before its problem."""
     files: list[str] = args.files
     output: str = args.output
-    options = Options(args.baud, args.quiet, args.echo, args.reply, args.burst)
+    options = wire_times.read(args)
     if output != "-":
         for name in files:
             if name != "-" and os.path.realpath(name) == os.path.realpath(output):

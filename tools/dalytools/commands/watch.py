@@ -26,7 +26,7 @@ from dalycapture.interface import bus_name, tap
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
-from dalyref.decoder import decode
+from dalyref.decoder import Options, decode
 from dalytools import __version__
 from dalytools.commands.check import SHOWN
 from dalytools.comparison import compare
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
             tally = _watch(args, tshark, screen, path, bus)
             if screen.failure:
                 return _unseen(screen.failure, path)
-            return _sum_up(tshark, path, tally)
+            return _sum_up(tshark, path, tally, Options(baud=args.baud))
     except CaptureError as error:
         raise Problem(str(error)) from None
 
@@ -165,7 +165,14 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path
                 faults.append(f"the live view broke off, the capture did not: {why}")
                 print(f"dalyshark watch: {faults[-1]}", file=sys.stderr)  # noqa: T201
 
-            view = LiveView(tshark, screen, ended, link_type=interface.link_type, application=APPLICATION)
+            view = LiveView(
+                tshark,
+                screen,
+                ended,
+                options=Options(baud=args.baud),
+                link_type=interface.link_type,
+                application=APPLICATION,
+            )
             stack.callback(view.finish)
             sinks.append(view.sink)
         sniffer = Sniffer(port, interface, sinks, limits=Limits(duration=duration))
@@ -224,11 +231,11 @@ def _unseen(failure: OSError, path: Path) -> int:
     raise failure  # its usual end: status 0
 
 
-def _sum_up(tshark: Tshark, path: Path, tally: Tally) -> int:
+def _sum_up(tshark: Tshark, path: Path, tally: Tally, options: Options) -> int:
     """Print the summary of the file just written, the verdict of both readings, and where it is."""
     summary = Summary()
     with progress_bar("reading") as advance:
-        for record in decode(read_capture(path)):
+        for record in decode(read_capture(path), options):
             summary.add(record)
             if record.number % 1024 == 0:
                 advance(record.number)
@@ -241,7 +248,7 @@ def _sum_up(tshark: Tshark, path: Path, tally: Tally) -> int:
         print("  No good frame: wrong baud rate, or A and B swapped?")  # noqa: T201
     for note in tally.notes:
         print(f"  Note: {plain(note)}")  # noqa: T201
-    differences = _checked(tshark, path) if tally.records else 0
+    differences = _checked(tshark, path, options) if tally.records else 0
     where = plain(str(path))
     print(f"\nThe capture: {where}")  # noqa: T201
     print(f"Open it:     wireshark -X lua_script:{dissector_folder() / 'daly.lua'} {where}")  # noqa: T201
@@ -250,11 +257,11 @@ def _sum_up(tshark: Tshark, path: Path, tally: Tally) -> int:
     return 1 if differences else 0
 
 
-def _checked(tshark: Tshark, path: Path) -> int:
+def _checked(tshark: Tshark, path: Path, options: Options) -> int:
     """Compare both readings of the file; print and return how many differences there are."""
     try:
         with progress_bar("check") as advance:
-            result = compare(tshark, path, progress=advance)
+            result = compare(tshark, path, options=options, progress=advance)
     except KeyboardInterrupt:
         print(f"\nCheck: left out, as you wish; later: dalyshark check {path}")  # noqa: T201
         return 0
