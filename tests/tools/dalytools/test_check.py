@@ -79,7 +79,7 @@ def test_the_worst_file_decides_and_many_differences_are_cut(
     assert lines[1] == "  packet 2  daly.soc: dissector 3.85, reference 38.5"
     assert len(lines) == 1 + 20 + 1 + 1
     assert lines[-2] == "  and 3 more"
-    assert lines[-1].startswith("3 files, 48 records, ")
+    assert lines[-1].startswith("2 of 3 files, 48 records, ")  # the text file was not compared
     assert lines[-1].endswith(": 23 differences")
 
 
@@ -155,3 +155,8 @@ def test_constants_are_options(capsys: pytest.CaptureFixture[str]) -> None:
     sample = str(SAMPLES / "real-poll-cycle.pcapng")
     assert main(["check", sample, "--baud", "19200", "--silence", "0.1", "--reply", "0.02"]) == 0
     assert "0 differences" in capsys.readouterr().out
+
+
+def test_what_was_not_compared_has_no_verdict(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["check", str(tmp_path / "none.pcapng")]) == 2
+    assert capsys.readouterr().out == ""

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare every file; print a line a file, each difference, and the sum."""
-    worst = records = differences = 0
+    worst = records = differences = compared = 0
     options = wire_times.read(args)
     with Tshark() as tshark:
         for name in args.files:
@@ -49,13 +49,15 @@ def run(args: argparse.Namespace) -> int:
                 worst = 2
                 continue
             show(name, result, quiet=args.quiet)
+            compared += 1
             records += result.records
             differences += result.found
             if result.broken:
                 said = plain(f"{result.broken}; compared what is there")
                 print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201
             worst = max(worst, 2 if result.broken else 1 if result.found else 0)
-        print(sum_up(len(args.files), records, differences, tshark.version))  # noqa: T201
+        if compared:
+            print(sum_up(compared, len(args.files), records, differences, tshark.version))  # noqa: T201
     return worst
 
 
@@ -70,7 +72,8 @@ def show(name: str, result: Comparison, *, quiet: bool = False) -> None:
         print(f"  and {result.found - SHOWN} more")  # noqa: T201
 
 
-def sum_up(files: int, records: int, differences: int, version: str) -> str:
-    """Say in a line what was compared."""
-    what = f"{counted(files, 'file')}, {counted(records, 'record')}"
+def sum_up(compared: int, asked: int, records: int, differences: int, version: str) -> str:
+    """Say in a line what was compared; nothing is said of files that could not be."""
+    files = counted(compared, "file") if compared == asked else f"{compared} of {counted(asked, 'file')}"
+    what = f"{files}, {counted(records, 'record')}"
     return f"{what}, tshark {version}: {counted(differences, 'difference')}"
