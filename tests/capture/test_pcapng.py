@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import shutil
 import struct
 import subprocess
 from dataclasses import dataclass
@@ -182,9 +181,6 @@ def test_scapy_reads_it(sample: Path) -> None:
     assert [meta.tsresol for _, meta in packets] == [10**9] * len(SAMPLE)
 
 
-needs_tshark = pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
-
-
 def tshark(path: Path, *words: str) -> list[list[str]]:
     fields = [word for name in words for word in ("-e", name)]
     command = ["tshark", "-r", str(path), "-T", "fields", "-E", "separator=|", *fields]
@@ -192,7 +188,6 @@ def tshark(path: Path, *words: str) -> list[list[str]]:
     return [line.split("|") for line in done.stdout.splitlines()]
 
 
-@needs_tshark
 def test_tshark_reads_it(sample: Path) -> None:
     lines = tshark(
         sample,
@@ -218,7 +213,6 @@ def test_tshark_reads_it(sample: Path) -> None:
         assert description.startswith("dalyshark bus=main")
 
 
-@needs_tshark
 def test_tshark_sees_the_bytes(sample: Path) -> None:
     done = subprocess.run(
         ["tshark", "-r", str(sample), "-T", "json", "-x"], capture_output=True, text=True, check=True, timeout=60
@@ -305,7 +299,6 @@ def test_simple_and_obsolete_packets_and_unknown_blocks() -> None:
     ]
 
 
-@needs_tshark
 @pytest.mark.parametrize("kind", [0x9, 0xBAD, 0x40000BAD, 0x77])
 def test_numbers_are_wiresharks(kind: int, tmp_path: Path) -> None:
     """Wireshark shows some blocks that hold no packet as one (journal, custom); the others it skips."""
@@ -344,7 +337,6 @@ def test_python_pcapng_writes_and_we_read() -> None:
     assert got.time_ns == (1 << 32) + 2
 
 
-@needs_tshark
 def test_editcap_writes_and_we_read(sample: Path, tmp_path: Path) -> None:
     """Wireshark's own writer, from our file: bytes, times, comments and directions stay."""
     out = tmp_path / "again.pcapng"

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import shutil
 import struct
 import subprocess
 import sys
@@ -93,7 +92,6 @@ def test_scapy_reads_and_writes_pcap(tmp_path: Path) -> None:
     assert [(p.time_ns, p.data) for p in read_capture(tmp_path / "y.pcap")] == FRAMES
 
 
-@pytest.mark.skipif(not shutil.which("tshark"), reason="tshark is not installed")
 def test_tshark_reads_pcap(tmp_path: Path) -> None:
     command = [
         "tshark",

@@ -6,7 +6,7 @@
 #   make_wireshark.sh SUITE FOLDER      SUITE: bookworm (4.0), trixie (4.4), sid (newest)
 #
 #   FOLDER/tshark, sharkd, editcap ..   started like any program, see this machine's paths
-#   FOLDER/root/                        what the packages hold, unpacked, never configured
+#   FOLDER/files/                       what the packages hold, unpacked, never configured
 #   FOLDER/version                      first line of `tshark --version`
 #
 # Needs neither root nor a chroot: apt works out what tshark depends on against an empty status file and fetches it
@@ -40,8 +40,8 @@ mirror=${DALYSHARK_DEBIAN_MIRROR:-$(
 
 mkdir -p "$2"
 folder=$(cd "$2" && pwd)
-rm -rf "$folder/root" "$folder/apt" "$folder/version"
-mkdir -p "$folder/root" "$folder/apt/state/lists/partial" "$folder/apt/cache/archives/partial"
+rm -rf "$folder/files" "$folder/apt" "$folder/version"
+mkdir -p "$folder/files" "$folder/apt/state/lists/partial" "$folder/apt/cache/archives/partial"
 : >"$folder/apt/status"
 echo "deb [signed-by=$keyring] $mirror $suite main" >"$folder/apt/sources.list"
 
@@ -57,11 +57,11 @@ log=$folder/apt/log
 { apt update && apt install --yes --download-only tshark; } >"$log" 2>&1 ||
     die "$suite: $(sed -n 's/^E: //p' "$log" | head -n 1) (all of it: $log)"
 for package in "$folder"/apt/cache/archives/*.deb; do
-    dpkg-deb --extract "$package" "$folder/root"
+    dpkg-deb --extract "$package" "$folder/files"
 done
 
 # The loader lies beside the wrappers: Wireshark takes its folder for the program's own, and looks for dumpcap there.
-loader=$(find "$folder/root/" -name 'ld-linux*.so.*' -path '*-linux-gnu*' | head -n 1)
+loader=$(find "$folder/files" -name 'ld-linux*.so.*' -path '*-linux-gnu*' | head -n 1)
 [ -n "$loader" ] || die "$suite: no dynamic loader among the packages"
 libraries=${loader%/*}
 triplet=${libraries##*/}
@@ -73,11 +73,11 @@ wrapper() {
 #!/bin/sh
 # Starts the $suite release's $1 through that release's dynamic loader. Made by make_wireshark.sh.
 here=\$(cd "\$(dirname "\$(readlink -f "\$0")")" && pwd)
-root=\$here/root
-: "\${WIRESHARK_DATA_DIR:=\$root/usr/share/wireshark}"
-: "\${WIRESHARK_PLUGIN_DIR:=\$root/usr/lib/$triplet/wireshark/plugins}"
+files=\$here/files
+: "\${WIRESHARK_DATA_DIR:=\$files/usr/share/wireshark}"
+: "\${WIRESHARK_PLUGIN_DIR:=\$files/usr/lib/$triplet/wireshark/plugins}"
 export WIRESHARK_DATA_DIR WIRESHARK_PLUGIN_DIR
-set -- "\$here/ld.so" --inhibit-cache --library-path "\$root/usr/lib/$triplet:\$root/lib/$triplet" "\$root/usr/bin/$1" "\$@"
+set -- "\$here/ld.so" --inhibit-cache --library-path "\$files/usr/lib/$triplet:\$files/lib/$triplet" "\$files/usr/bin/$1" "\$@"
 if [ "\$(id -u)" = 0 ]; then
     if unshare --user --map-user=1000 --map-group=1000 true 2>/dev/null; then
         set -- unshare --user --map-user=1000 --map-group=1000 "\$@"

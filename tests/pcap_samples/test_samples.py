@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -118,7 +117,6 @@ def test_chunked_sample_is_cut_as_promised() -> None:
     assert b"".join(packet.data for packet in clean).startswith(stream)
 
 
-@pytest.mark.skipif(shutil.which("tshark") is None, reason="needs tshark")
 @each
 def test_tshark_reads_every_packet(entry: Entry) -> None:
     """Wireshark's own view of the bytes, without our dissector."""
