@@ -34,7 +34,7 @@ matrix: ## the dissector's tests in several versions of Wireshark; make matrix A
 	$(DEV_SETUP)
 	@$(PY) tests/matrix/run.py $(ARGS)
 
-soak: ## a long capture of a simulated bus
+soak: ## a million records, good and damaged, through both readings
 	$(DEV_SETUP)
 	@$(PY) -m bench.soak $(ARGS)
 
