@@ -87,7 +87,10 @@ class Terminal:
                 self._open()
             return
         with contextlib.suppress(OSError):
-            tty.setraw(peer, termios.TCSAFLUSH)  # flushes what was sent to it, not what it wrote
+            # What was sent may still be on its way in the kernel: that is dropped from this side, the rest from the
+            # listener's; what the listener wrote stays.
+            termios.tcflush(self.fd, termios.TCOFLUSH)
+            tty.setraw(peer, termios.TCSAFLUSH)
         os.close(peer)
 
     def send(self, data: bytes) -> None:
