@@ -5,7 +5,7 @@
 --
 --   A5 frame    A5 | address | data ID | 08 | d0 d1 d2 d3 d4 d5 d6 d7 | sum          paper Daly UART/485 V1.2
 --
---   packets --daly_streams--> records --daly_bus--> their meaning --daly_view--> tree, columns
+--   packets --daly_serial, daly_tcp--> daly_streams --> records --daly_bus--> their meaning --daly_view--> tree, columns
 --
 -- Runs in Lua 5.2 (Wireshark 4.0, 4.2) to 5.4 (4.4, 4.6).
 
@@ -25,9 +25,10 @@ if set_plugin_info then
 end
 
 local field_module = require("daly_fields")
-local streams = require("daly_streams")
-local records = require("daly_records")
+local windows = require("daly_windows")
 local view = require("daly_view")
+local serial = require("daly_serial")
+local tcp = require("daly_tcp")
 
 view.setup(daly)
 daly.fields = field_module.list
@@ -40,6 +41,7 @@ daly.experts = expert_list
 -- Preferences: the constants of docs/records.md, and where our packets come from ------------------
 
 local FIRST_DLT, LAST_DLT, PKTAP_DLT = 147, 162, 149
+local LAST_PORT = 65535
 
 local prefs = daly.prefs
 prefs.link_types = Pref.range(
@@ -48,185 +50,68 @@ prefs.link_types = Pref.range(
   "Link types, 147 (USER0) to 162 (USER15), whose packets hold bytes of a Daly bus. Not 149: Wireshark itself uses it.",
   LAST_DLT
 )
+prefs.tcp_ports =
+  Pref.range("TCP ports", "", "TCP ports on which a serial server carries the bytes of a bus (raw, no Telnet)", LAST_PORT)
+prefs.heuristic = Pref.bool(
+  "Look for Daly frames in any TCP connection",
+  false,
+  "Take a TCP connection for a bus when it begins with a Daly frame, whatever its port"
+)
+prefs.modbus = Pref.bool(
+  "Recognise Modbus frames",
+  true,
+  "Frames of Daly's Modbus dialects (addresses D2, 81..90, 51..60) are records; off: their bytes are junk"
+)
 prefs.baud = Pref.uint("Baud rate", 9600, "Baud rate of the bus, for the time that bytes take on the wire")
 prefs.quiet =
   Pref.uint("Incomplete frame given up after (ms)", 250, "An incomplete frame is given up after so much quiet")
 prefs.echo = Pref.uint("Echo within (ms)", 100, "A request that comes again within this time is an echo, later a retry")
 prefs.reply = Pref.uint("Reply within (ms)", 1000, "A request waits so long for its reply")
+prefs.late = Pref.uint("Late reply within (ms)", 10000, "A reply that comes later than its request waits, but within this")
+prefs.slow = Pref.uint("Slow reply after (ms)", 500, "A reply that takes longer than this gets a note")
 prefs.burst =
   Pref.uint("Burst ends after quiet of (ms)", 500, "Frames of 0x95, 0x96 and texts further apart are not one burst")
+prefs.age = Pref.uint("Records compared within (ms)", 10000, "Records further apart than this do not contradict each other")
+prefs.cell_tolerance =
+  Pref.uint("Tolerance of cell voltages (mV)", 20, "0x91 and the cells of 0x95 may differ by so much")
+prefs.temperature_tolerance =
+  Pref.uint("Tolerance of temperatures (C)", 2, "0x92 and the sensors of 0x96 may differ by so much")
+prefs.sum_tolerance =
+  Pref.uint("Tolerance of the pack voltage (%)", 1, "The pack voltage and the sum of the cells may differ by so much")
 
 local function seconds(milliseconds)
   return milliseconds / 1000
 end
 
--- State of the capture that is open ---------------------------------------------------------------
+-- Packets -----------------------------------------------------------------------------------------
 
-local capture -- as read in order, once
-local interfaces -- by number: what is known of each
-local handed -- packets that were given to the user's own DLT_USER setting, by number
-local read_to -- number of the newest packet that was read
-
--- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one,
--- and without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows
--- better: if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows
--- at once.) nil, or { capture =, interfaces =, after = the next packet's number by number, newest =: the last of those,
--- last =: number of the last packet read again, only =: the interface, several =: it is not the only one }.
-local blind
-
--- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
-local others, unset = {}, {}
-
-local interface_id = Field.new("frame.interface_id")
-local interface_description = Field.new("frame.interface_description")
-local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
-
-local function new_capture()
-  return streams.capture({
+function daly.init()
+  windows.recognise_modbus(prefs.modbus)
+  local options = {
     baud = math.max(1, prefs.baud),
     quiet = seconds(prefs.quiet),
     echo = seconds(prefs.echo),
     reply = seconds(prefs.reply),
+    late = seconds(prefs.late),
+    slow = seconds(prefs.slow),
     burst = seconds(prefs.burst),
-  })
+    age = seconds(prefs.age),
+    cell_tolerance = prefs.cell_tolerance,
+    temperature_tolerance = prefs.temperature_tolerance,
+    sum_tolerance = prefs.sum_tolerance,
+  }
+  serial.init(options)
+  tcp.init(options)
 end
-
-function daly.init()
-  capture = new_capture()
-  interfaces, handed, read_to, blind = {}, {}, 0, nil
-end
-
--- The interface of the packet at hand, in this list of those known; the number -1 stands for one that can't be told.
-local function interface_of(known)
-  local id = interface_id()
-  local key = id and id.value or -1
-  local interface = known[key]
-  if not interface then
-    local info = interface_description()
-    local description = info and tostring(info.value) or ""
-    interface = {
-      key = key,
-      ours = description:sub(1, 9) == "dalyshark",
-      -- Interfaces are one bus when they name the same; else each is its own.
-      bus = description:match("bus=([^%s,;]+)") or key,
-      streams = {},
-    }
-    known[key] = interface
-  end
-  return interface
-end
-
-local function stream_of(from, interface, direction)
-  local stream = interface.streams[direction]
-  if not stream then
-    local side = direction ~= -1 and direction or nil
-    stream = streams.stream(from, interface.key * 4 + direction, interface.bus, side)
-    interface.streams[direction] = stream
-  end
-  return stream
-end
-
--- What to show a packet from that was read without its interface: the capture, and whether its end is known.
--- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
-local function second_look(number, direction, time, raw)
-  local interface = interface_of(blind.interfaces)
-  blind.only = blind.only or interface.key
-  blind.several = blind.several or interface.key ~= blind.only
-  if number == blind.after[blind.last] then
-    streams.first(blind.capture, stream_of(blind.capture, interface, direction), number, time, raw)
-    blind.last = number
-  end
-  if not blind.several then
-    return capture, true
-  elseif number <= blind.last then
-    return blind.capture, false
-  end
-  return nil, true
-end
-
--- Packets -----------------------------------------------------------------------------------------
 
 local handle
-local bytes_of = Tvb.raw
-
--- Whether any of these items is a frame, or a part of one.
-local function has_frame(items)
-  for i = 1, #items do
-    if items[i].kind == "frame" or items[i].part then
-      return true
-    end
-  end
-  return false
-end
-
--- Packets on a user's link type without a Daly frame belong to the user's own setting, where there is one (DESIGN 4).
--- Returns how many bytes that setting's dissector took, or nil when there is none.
-local function hand_over(buffer, pinfo, parent)
-  local encapsulation = pinfo.match_uint
-  local other = others[encapsulation]
-  if not other or unset[encapsulation] then
-    return nil
-  end
-  local taken = other:call(buffer, pinfo, parent)
-  if has_not_handled and not_handled() then
-    unset[encapsulation] = true
-    return nil
-  end
-  return taken
-end
 
 function daly.dissector(buffer, pinfo, parent)
-  local raw = bytes_of(buffer)
-  local length = #raw
-  local number = pinfo.number
-  local again = number <= read_to or pinfo.visited
-  local from = capture
-  local whole
-  if not again then
-    read_to = number
-    local interface = interface_of(interfaces)
-    local direction = pinfo.p2p_dir
-    whole = streams.first(capture, stream_of(capture, interface, direction), number, pinfo.rel_ts, raw)
-    if interface.key == -1 then
-      blind = blind or { capture = new_capture(), interfaces = {}, after = {}, last = 0, newest = 0 }
-      blind.after[blind.newest] = number
-      blind.newest = number
-    end
-    if not interface.ours then
-      if whole or has_frame(streams.plan(capture, number, false)) then
-        interface.ours = true
-      else
-        handed[number] = true
-      end
-    end
-  else
-    if blind then
-      from, again = second_look(number, pinfo.p2p_dir, pinfo.rel_ts, raw)
-    end
-    whole = from and from.plans[number] == nil and length == 13 and raw:byte() == 0xA5
-  end
-
   handle = handle or Dissector.get("daly")
-  if whole then
-    view.look(parent, handle, from.results, again)
-    view.whole(parent, buffer, raw, number, pinfo)
-    return length
+  if pinfo.can_desegment > 0 or pinfo.port_type == TCP then
+    return tcp.dissect(buffer, pinfo, parent, handle)
   end
-
-  local items = from and streams.plan(from, number, again)
-  if not items then -- nothing is known of it (see second_look; with -R, packets are left out and numbers come twice)
-    from, items = streams.capture({ baud = prefs.baud }), records.alone(raw)
-  end
-  if handed[number] then
-    if has_frame(items) then
-      handed[number] = nil
-    elseif hand_over(buffer, pinfo, parent) then
-      return length
-    end
-  end
-  view.look(parent, handle, from.results, again)
-  view.several(parent, buffer, raw, items, pinfo)
-  return length
+  return serial.dissect(buffer, pinfo, parent, handle)
 end
 
 -- Doors -------------------------------------------------------------------------------------------
@@ -253,21 +138,51 @@ local function claim()
   for dlt = FIRST_DLT, LAST_DLT do
     local encapsulation = wtap["USER" .. (dlt - FIRST_DLT)]
     if wanted_types[dlt] and not claimed[dlt] then
-      others[encapsulation] = others[encapsulation] or encapsulations:get_dissector(encapsulation)
+      serial.others[encapsulation] = serial.others[encapsulation] or encapsulations:get_dissector(encapsulation)
       encapsulations:add(encapsulation, daly)
       claimed[dlt] = true
     elseif claimed[dlt] and not wanted_types[dlt] then
       encapsulations:remove(encapsulation, daly)
-      if others[encapsulation] then
-        encapsulations:add(encapsulation, others[encapsulation])
+      if serial.others[encapsulation] then
+        encapsulations:add(encapsulation, serial.others[encapsulation])
       end
       claimed[dlt] = nil
     end
   end
 end
 
+-- TCP ports that are ours, as the preference says.
+local tcp_ports = DissectorTable.get("tcp.port")
+local claimed_ports = ""
+
+local function claim_ports()
+  local wanted = tostring(prefs.tcp_ports)
+  if wanted == claimed_ports then
+    return
+  end
+  if claimed_ports ~= "" then
+    tcp_ports:remove(claimed_ports, daly)
+  end
+  if wanted ~= "" then
+    tcp_ports:add(wanted, daly)
+  end
+  claimed_ports = wanted
+end
+
 function daly.prefs_changed()
   claim()
+  claim_ports()
 end
 
 claim()
+tcp_ports:add_for_decode_as(daly)
+DissectorTable.get("rtacser.data"):add_for_decode_as(daly)
+
+daly:register_heuristic("tcp", function(buffer, pinfo, parent)
+  if not prefs.heuristic or not tcp.looks_like(buffer) then
+    return false
+  end
+  pinfo.conversation = daly
+  daly.dissector(buffer, pinfo, parent)
+  return true
+end)

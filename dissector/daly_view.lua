@@ -18,8 +18,8 @@ local range = Tvb.range
 local packet_comment = Field.new("frame.comment")
 
 -- The packet at hand: our protocol; what is known of its frames (daly_bus); whether anybody asked for a field of ours,
--- and whether somebody looks at the tree; whether the capture was read to its end.
-local daly, results, wanted, visible, again
+-- and whether somebody looks at the tree; whether the capture was read to its end; the medium.
+local daly, results, wanted, visible, again, transport
 
 --- Once: the protocol, which the items of the tree belong to.
 function M.setup(proto)
@@ -27,11 +27,11 @@ function M.setup(proto)
 end
 
 --- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
--- capture was read to its end.
-function M.look(parent, handle, known, read)
+-- capture was read to its end; `medium`: uart where it is nil.
+function M.look(parent, handle, known, read, medium)
   wanted = referenced(parent, handle)
   visible = wanted and parent.visible
-  results, again = known, read
+  results, again, transport = known, read, medium or "uart"
 end
 
 -- Tree --------------------------------------------------------------------------------------------
@@ -305,7 +305,7 @@ local function begin(parent, buffer, offset, length, kind)
   tree = wanted and length > 0 and add(parent, daly, range(buffer, offset, length)) or add(parent, daly)
   if wanted then
     made(fields.kind, kind)
-    made(fields.transport, "uart")
+    made(fields.transport, transport)
   end
   return tree
 end
@@ -375,8 +375,12 @@ function M.several(parent, buffer, raw, items, pinfo)
     texts[MOST_WORDS + 1] = format("and %d more", #items - MOST_WORDS)
   end
   local cols = pinfo.cols
+  local words = concat(texts, " | ")
+  if transport == "tcp" and tostring(cols.protocol) == "Daly" then -- more of the same segment
+    words = tostring(cols.info) .. " | " .. words
+  end
   cols.protocol = "Daly"
-  cols.info = concat(texts, " | ")
+  cols.info = words
   if source then
     cols.src = source
     cols.dst = destination

@@ -17,8 +17,15 @@ local M = {}
 
 local byte = string.byte
 
+local A5_STARTS, ALL_STARTS = "\xA5", "[\xA5\xD2\x51-\x60\x81-\x90]"
+
 -- Every byte that a window can begin with.
-M.STARTS = "[\xA5\xD2\x51-\x60\x81-\x90]"
+M.STARTS = ALL_STARTS
+
+--- Whether Modbus frames are windows too, from now on.
+function M.recognise_modbus(yes)
+  M.STARTS = yes and ALL_STARTS or A5_STARTS
+end
 
 -- Modbus's own limit for a write of several registers.
 local MOST_WRITTEN = 123
@@ -166,6 +173,8 @@ function M.window(buf, p, n)
       return nil
     end
     return nil, nil, p + 3 > n or byte(buf, p + 3) == 8
+  elseif M.STARTS == A5_STARTS then
+    return nil
   end
   local dialect, one, two, three = modbus_lengths(buf, p, n)
   if not dialect then

@@ -1,0 +1,192 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Packets of a serial line: a capture of a user link type (each packet is bytes of the line, docs/records.md 1), or an
+-- RTAC serial capture (link type 250), whose own dissector takes a header of 12 bytes off and hands us the rest.
+--
+--   packet --interface, direction--> stream (daly_streams) --> records --> daly_view
+
+local streams = require("daly_streams")
+local records = require("daly_records")
+local view = require("daly_view")
+
+local M = {}
+
+local bytes_of = Tvb.raw
+
+-- State of the capture that is open.
+local options
+local capture -- as read in order, once
+local interfaces -- by number: what is known of each
+local handed -- packets that were given to the user's own DLT_USER setting, by number
+local read_to -- number of the newest packet that was read
+
+-- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one,
+-- and without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows
+-- better: if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows
+-- at once.) nil, or { capture =, interfaces =, after = the next packet's number by number, newest =: the last of those,
+-- last =: number of the last packet read again, only =: the line, several =: it is not the only one }.
+local blind
+
+-- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
+local unset = {}
+M.others = {}
+
+local interface_id = Field.new("frame.interface_id")
+local interface_description = Field.new("frame.interface_description")
+local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
+local has_rtac, rtac_event = pcall(Field.new, "rtacser.event_type")
+
+-- RTAC serial: events 01 and 02 carry data, sent and received by the RTAC; as p2p_dir: 0 sent, 1 received.
+local RTAC_DIRECTION = { [1] = 0, [2] = 1 }
+
+--- Begin a capture. `with`: see daly_streams.capture.
+function M.init(with)
+  options = with
+  capture = streams.capture(options)
+  interfaces, handed, read_to, blind = {}, {}, 0, nil
+end
+
+--- What was found out about the capture's frames so far, see daly_streams.
+function M.capture()
+  return capture
+end
+
+-- The interface of the packet at hand, in this list of those known; the number -1 stands for one that can't be told.
+local function interface_of(known)
+  local id = interface_id()
+  local key = id and id.value or -1
+  local interface = known[key]
+  if not interface then
+    local info = interface_description()
+    local description = info and tostring(info.value) or ""
+    interface = {
+      key = key,
+      ours = description:sub(1, 9) == "dalyshark",
+      -- Interfaces are one bus when they name the same; else each is its own.
+      bus = description:match("bus=([^%s,;]+)") or key,
+      streams = {},
+    }
+    known[key] = interface
+  end
+  return interface
+end
+
+-- Direction of the packet at hand: -1 not known, 0 sent, 1 received.
+local function direction_of(pinfo)
+  if has_rtac and pinfo.match_uint == wtap.RTAC_SERIAL then
+    local event = rtac_event()
+    return event and RTAC_DIRECTION[event.value] or -1
+  end
+  return pinfo.p2p_dir
+end
+
+local function stream_of(from, interface, direction)
+  local stream = interface.streams[direction]
+  if not stream then
+    local side = direction ~= -1 and direction or nil
+    stream = streams.stream(from, interface.key * 4 + direction, interface.bus, side)
+    interface.streams[direction] = stream
+  end
+  return stream
+end
+
+-- What to show a packet from that was read without its interface: the capture, and whether its end is known.
+-- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
+local function second_look(number, pinfo, raw)
+  local interface, direction = interface_of(blind.interfaces), direction_of(pinfo)
+  -- A direction that was known in the first pass too divides nothing that was not divided then.
+  local line = interface.key * 4 + (direction ~= pinfo.p2p_dir and direction or -1)
+  blind.only = blind.only or line
+  blind.several = blind.several or line ~= blind.only
+  if number == blind.after[blind.last] then
+    streams.first(blind.capture, stream_of(blind.capture, interface, direction), number, pinfo.rel_ts, raw)
+    blind.last = number
+  end
+  if not blind.several then
+    return capture, true
+  elseif number <= blind.last then
+    return blind.capture, false
+  end
+  return nil, true
+end
+
+-- Whether any of these items is a frame, or a part of one.
+local function has_frame(items)
+  for i = 1, #items do
+    if items[i].kind == "frame" or items[i].part then
+      return true
+    end
+  end
+  return false
+end
+
+-- Packets on a user's link type without a Daly frame belong to the user's own setting, where there is one (DESIGN 4).
+-- Returns how many bytes that setting's dissector took, or nil when there is none.
+local function hand_over(buffer, pinfo, parent)
+  local encapsulation = pinfo.match_uint
+  local other = M.others[encapsulation]
+  if not other or unset[encapsulation] then
+    return nil
+  end
+  local taken = other:call(buffer, pinfo, parent)
+  if has_not_handled and not_handled() then
+    unset[encapsulation] = true
+    return nil
+  end
+  return taken
+end
+
+--- Dissect a packet of a serial line. `handle`: our protocol's dissector. Returns how many bytes were taken.
+function M.dissect(buffer, pinfo, parent, handle)
+  local raw = bytes_of(buffer)
+  local length = #raw
+  local number = pinfo.number
+  local again = number <= read_to or pinfo.visited
+  local from = capture
+  local whole
+  if not again then
+    read_to = number
+    local interface = interface_of(interfaces)
+    whole = streams.first(capture, stream_of(capture, interface, direction_of(pinfo)), number, pinfo.rel_ts, raw)
+    if interface.key == -1 then
+      blind = blind or { capture = streams.capture(options), interfaces = {}, after = {}, last = 0, newest = 0 }
+      blind.after[blind.newest] = number
+      blind.newest = number
+    end
+    if not interface.ours then
+      if whole or has_frame(streams.plan(capture, number, false)) then
+        interface.ours = true
+      else
+        handed[number] = true
+      end
+    end
+  else
+    if blind then
+      from, again = second_look(number, pinfo, raw)
+    end
+    whole = from and from.plans[number] == nil and length == 13 and raw:byte() == 0xA5
+  end
+
+  if whole then
+    view.look(parent, handle, from.results, again)
+    view.whole(parent, buffer, raw, number, pinfo)
+    return length
+  end
+
+  local items = from and streams.plan(from, number, again)
+  if not items then -- nothing is known of it (see second_look; with -R, packets are left out and numbers come twice)
+    from, items = streams.capture(options), records.alone(raw)
+  end
+  if handed[number] then
+    if has_frame(items) then
+      handed[number] = nil
+    elseif hand_over(buffer, pinfo, parent) then
+      return length
+    end
+  end
+  view.look(parent, handle, from.results, again)
+  view.several(parent, buffer, raw, items, pinfo)
+  return length
+end
+
+return M
