@@ -5,7 +5,7 @@
 --
 --   A5 frame    A5 | address | data ID | 08 | d0 d1 d2 d3 d4 d5 d6 d7 | sum          paper Daly UART/485 V1.2
 --
---   packets --daly_serial, daly_tcp--> daly_streams --> records --daly_bus--> their meaning --daly_view--> tree, columns
+--   packets --daly_serial, daly_tcp--> records --daly_bus--> their meaning --daly_view--> tree, columns
 --
 -- Runs in Lua 5.2 (Wireshark 4.0, 4.2) to 5.4 (4.4, 4.6).
 
@@ -51,7 +51,7 @@ prefs.link_types = Pref.range(
   LAST_DLT
 )
 prefs.tcp_ports =
-  Pref.range("TCP ports", "", "TCP ports on which a serial server carries the bytes of a bus (raw, no Telnet)", LAST_PORT)
+  Pref.range("TCP ports", "", "Ports of serial servers that carry the bytes of a bus (raw, no Telnet)", LAST_PORT)
 prefs.heuristic = Pref.bool(
   "Look for Daly frames in any TCP connection",
   false,
@@ -67,11 +67,12 @@ prefs.quiet =
   Pref.uint("Incomplete frame given up after (ms)", 250, "An incomplete frame is given up after so much quiet")
 prefs.echo = Pref.uint("Echo within (ms)", 100, "A request that comes again within this time is an echo, later a retry")
 prefs.reply = Pref.uint("Reply within (ms)", 1000, "A request waits so long for its reply")
-prefs.late = Pref.uint("Late reply within (ms)", 10000, "A reply that comes later than its request waits, but within this")
+prefs.late =
+  Pref.uint("Late reply within (ms)", 10000, "A reply later than its request waits, but within this, is late")
 prefs.slow = Pref.uint("Slow reply after (ms)", 500, "A reply that takes longer than this gets a note")
 prefs.burst =
   Pref.uint("Burst ends after quiet of (ms)", 500, "Frames of 0x95, 0x96 and texts further apart are not one burst")
-prefs.age = Pref.uint("Records compared within (ms)", 10000, "Records further apart than this do not contradict each other")
+prefs.age = Pref.uint("Records compared within (ms)", 10000, "Records further apart do not contradict each other")
 prefs.cell_tolerance =
   Pref.uint("Tolerance of cell voltages (mV)", 20, "0x91 and the cells of 0x95 may differ by so much")
 prefs.temperature_tolerance =
@@ -104,11 +105,13 @@ function daly.init()
   tcp.init(options)
 end
 
+local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
+
 local handle
 
 function daly.dissector(buffer, pinfo, parent)
   handle = handle or Dissector.get("daly")
-  if pinfo.can_desegment > 0 or pinfo.port_type == TCP then
+  if pinfo.port_type ~= NO_PORTS then
     return tcp.dissect(buffer, pinfo, parent, handle)
   end
   return serial.dissect(buffer, pinfo, parent, handle)

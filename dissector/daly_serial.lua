@@ -24,7 +24,8 @@ local read_to -- number of the newest packet that was read
 -- and without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows
 -- better: if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows
 -- at once.) nil, or { capture =, interfaces =, after = the next packet's number by number, newest =: the last of those,
--- last =: number of the last packet read again, only =: the line, several =: it is not the only one }.
+-- last =: number of the last packet read again, one_way =: RTAC's directions could not be told, only =: the line,
+-- several =: it is not the only one }.
 local blind
 
 -- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
@@ -34,7 +35,10 @@ M.others = {}
 local interface_id = Field.new("frame.interface_id")
 local interface_description = Field.new("frame.interface_description")
 local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
-local has_rtac, rtac_event = pcall(Field.new, "rtacser.event_type")
+local has_rtac, rtac_event = pcall(Field.new, "rtacser.eventtype")
+
+-- pinfo.match_uint where no number but the user's choice (Decode As) brought the packet here, as of RTAC's.
+local CHOSEN = 0
 
 -- RTAC serial: events 01 and 02 carry data, sent and received by the RTAC; as p2p_dir: 0 sent, 1 received.
 local RTAC_DIRECTION = { [1] = 0, [2] = 1 }
@@ -71,13 +75,13 @@ local function interface_of(known)
   return interface
 end
 
--- Direction of the packet at hand: -1 not known, 0 sent, 1 received.
+-- Direction of the packet at hand: -1 not known, 0 sent, 1 received; and whether it takes a tree to know it.
 local function direction_of(pinfo)
-  if has_rtac and pinfo.match_uint == wtap.RTAC_SERIAL then
+  if pinfo.match_uint == CHOSEN and has_rtac then
     local event = rtac_event()
-    return event and RTAC_DIRECTION[event.value] or -1
+    return event and RTAC_DIRECTION[event.value] or -1, event == nil
   end
-  return pinfo.p2p_dir
+  return pinfo.p2p_dir, false
 end
 
 local function stream_of(from, interface, direction)
@@ -95,7 +99,7 @@ end
 local function second_look(number, pinfo, raw)
   local interface, direction = interface_of(blind.interfaces), direction_of(pinfo)
   -- A direction that was known in the first pass too divides nothing that was not divided then.
-  local line = interface.key * 4 + (direction ~= pinfo.p2p_dir and direction or -1)
+  local line = interface.key * 4 + (blind.one_way and direction or -1)
   blind.only = blind.only or line
   blind.several = blind.several or line ~= blind.only
   if number == blind.after[blind.last] then
@@ -147,11 +151,13 @@ function M.dissect(buffer, pinfo, parent, handle)
   if not again then
     read_to = number
     local interface = interface_of(interfaces)
-    whole = streams.first(capture, stream_of(capture, interface, direction_of(pinfo)), number, pinfo.rel_ts, raw)
+    local direction, unseen = direction_of(pinfo)
+    whole = streams.first(capture, stream_of(capture, interface, direction), number, pinfo.rel_ts, raw)
     if interface.key == -1 then
       blind = blind or { capture = streams.capture(options), interfaces = {}, after = {}, last = 0, newest = 0 }
       blind.after[blind.newest] = number
       blind.newest = number
+      blind.one_way = blind.one_way or unseen
     end
     if not interface.ours then
       if whole or has_frame(streams.plan(capture, number, false)) then

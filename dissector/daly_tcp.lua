@@ -14,10 +14,10 @@ local windows = require("daly_windows")
 
 local M = {}
 
-local ONE_MORE_SEGMENT = DESEGMENT_ONE_MORE_SEGMENT or 0x0FFFFFFF
+local ONE_MORE_SEGMENT = 0x0FFFFFFF -- DESEGMENT_ONE_MORE_SEGMENT, which not every version gives Lua
 
 local capture -- options, buses by connection, results by slot (see daly_streams)
-local slots -- by packet number and bytes: slot of the first frame in them
+local slots -- of frames, see feed()
 
 --- Begin a capture. `with`: see daly_streams.capture.
 function M.init(with)
@@ -25,14 +25,20 @@ function M.init(with)
   slots = {}
 end
 
--- Name of the connection, the same for both directions, and which end sent this.
-local function connection_of(pinfo)
+-- The bus of the connection, the same for both directions, and which end sent this packet.
+local function bus_of(pinfo)
   local from = tostring(pinfo.src) .. " " .. pinfo.src_port
   local to = tostring(pinfo.dst) .. " " .. pinfo.dst_port
-  if from < to then
-    return from .. " " .. to, 0
+  local name, side = from .. " " .. to, 0
+  if to < from then
+    name, side = to .. " " .. from, 1
   end
-  return to .. " " .. from, 1
+  local bus = capture.buses[name]
+  if not bus then
+    bus = bus_module.new(capture.options, capture.results)
+    capture.buses[name] = bus
+  end
+  return bus, side
 end
 
 -- The records that are whole, and how many bytes at the end may begin one that is not.
@@ -44,7 +50,7 @@ local function cut(raw)
     -- A good frame that only waits to see its neighbour: it is one unless more comes.
     return records.alone(raw), 0
   end
-  if held > 0 and held <= #raw then
+  if cutter.base <= #raw - held then
     local before = records.as_gap(raw:sub(cutter.base, #raw - held), cutter.base)
     for i = 1, #before do
       found[#found + 1] = before[i]
@@ -56,33 +62,27 @@ local function cut(raw)
   return found, held
 end
 
--- Tell the bus about the frames among these records; they get their slots.
+-- Tell the bus, once, about the frames among these records; they get their slots. What Wireshark hands us at once may
+-- be cut otherwise when a packet is looked at again, so a frame is known by its packet, its bytes and its place among
+-- equals.
 local function feed(items, raw, pinfo)
-  local number = pinfo.number
-  local key = number .. " " .. raw
-  local slot = slots[key]
-  local bus, side
-  if not slot and not pinfo.visited then
-    local name
-    name, side = connection_of(pinfo)
-    bus = capture.buses[name]
-    if not bus then
-      bus = bus_module.new(capture.options, capture.results)
-      capture.buses[name] = bus
-    end
-    slot = capture.slots
-    slots[key] = slot
-  end
+  local number, bus, side = pinfo.number, nil, nil
+  local seen = {}
   for i = 1, #items do
     local item = items[i]
     if item.kind == "frame" and item.dialect == "a5" then
-      slot = (slot or 0) - 1
-      item.slot = slot
-      if bus then
-        local bytes = raw:sub(item.at + 1, item.at + item.length)
-        bus_module.feed(bus, slot, number, bytes, pinfo.rel_ts, pinfo.rel_ts, side, capture)
-        capture.slots = slot
+      local bytes = raw:sub(item.at + 1, item.at + item.length)
+      seen[bytes] = (seen[bytes] or 0) + 1
+      local key = number .. " " .. seen[bytes] .. " " .. bytes
+      if not slots[key] and not pinfo.visited then
+        capture.slots = capture.slots - 1
+        slots[key] = capture.slots
+        if not bus then
+          bus, side = bus_of(pinfo)
+        end
+        bus_module.feed(bus, slots[key], number, bytes, pinfo.rel_ts, pinfo.rel_ts, side, capture)
       end
+      item.slot = slots[key] or 0
     end
   end
 end
@@ -100,7 +100,7 @@ function M.dissect(buffer, pinfo, parent, handle)
       pinfo.desegment_offset = length - held
       pinfo.desegment_len = ONE_MORE_SEGMENT
     else
-      items, held = records.alone(raw), 0
+      items = records.alone(raw)
     end
   end
   if #items == 0 then

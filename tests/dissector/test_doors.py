@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Other ways in than a user link type: RTAC serial captures, TCP serial servers; and what preferences do to them."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+from scapy.layers.inet import IP, TCP
+from scapy.layers.l2 import Ether
+from scapy.packet import Packet, Raw
+from scapy.utils import wrpcap
+from tests.dissector.dissection import Dissect, P, a5, in_a_row, kinds, numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dalytools.tshark import Tshark
+
+EPOCH = 1_700_000_000
+REQUEST, REPLY = a5(0x40, 0x90), a5(1, 0x90, "0215000075300200")
+
+SENT, RECEIVED, STATUS = 1, 2, 0  # RTAC event types
+
+Rows = list[list[str]]
+
+
+def ask(tshark: Tshark, path: Path, *words: str, names: Sequence[str]) -> Rows:
+    path.chmod(0o644)
+    wanted = [word for name in names for word in ("-e", name)]
+    done = tshark.run(*words, "-r", str(path), "-T", "fields", *wanted, "-e", "_ws.lua.error")
+    assert done.returncode == 0, done.stderr
+    rows = [line.split("\t") for line in done.stdout.decode().splitlines()]
+    assert not any(row[-1] for row in rows), rows
+    return [row[:-1] for row in rows]
+
+
+def rtac(folder: Path, *events: tuple[int, str, float]) -> Path:
+    """A capture of link type 250: (event type, bytes as hex, time s)."""
+    data = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 250)
+    for kind, text, at in events:
+        payload = bytes.fromhex(text)
+        us = round(at * 1e6)
+        header = struct.pack(">IIBBH", EPOCH, us, kind, 0, 0)
+        data += struct.pack("<IIII", EPOCH + us // 1_000_000, us % 1_000_000, 12 + len(payload), 12 + len(payload))
+        data += header + payload
+    path = folder / "rtac.pcap"
+    path.write_bytes(data)
+    return path
+
+
+RTAC = ("-d", "rtacser.data,daly")
+
+
+@pytest.mark.parametrize("passes", [(), ("-2",), ("-2", "-Y", "frame")], ids=["one", "two", "two with a tree"])
+def test_rtac_serial_by_decode_as(tshark: Tshark, open_folder: Path, passes: tuple[str, ...]) -> None:
+    capture = rtac(open_folder, (SENT, REQUEST, 0), (STATUS, "", 0.04), (RECEIVED, REPLY, 0.05))
+    rows = ask(tshark, capture, *RTAC, *passes, names=["daly.direction", "daly.pack.voltage", "daly.request_in"])
+    assert rows == [["1", "", ""], ["", "", ""], ["2", "53.3", "1"]]
+
+
+@pytest.mark.parametrize("passes", [(), ("-2",), ("-2", "-Y", "frame")], ids=["one", "two", "two with a tree"])
+def test_rtac_directions_are_two_streams(tshark: Tshark, open_folder: Path, passes: tuple[str, ...]) -> None:
+    """A reply in two pieces with a request of the other side between them: one stream would damage both."""
+    capture = rtac(
+        open_folder,
+        (SENT, REQUEST, 0),
+        (RECEIVED, REPLY[:10], 0.05),
+        (SENT, a5(0x40, 0x93), 0.06),
+        (RECEIVED, REPLY[10:], 0.061),
+    )
+    rows = ask(tshark, capture, *RTAC, *passes, names=["daly.kind", "daly.data_id", "daly.continued_in"])
+    # What is held is known to be continued when it has been: in a second pass with a tree in the first.
+    known = passes == ("-2", "-Y", "frame")
+    assert rows[1] == (["", "", "4"] if known else ["short", "", ""])
+    assert rows[:1] + rows[2:] == [["frame", "0x90", ""], ["frame", "0x93", ""], ["frame", "0x90", ""]]
+
+
+def test_rtac_without_decode_as_is_left_alone(tshark: Tshark, open_folder: Path) -> None:
+    assert ask(tshark, rtac(open_folder, (SENT, REQUEST, 0)), names=["daly.kind"]) == [[""]]
+
+
+@dataclass
+class Connection:
+    """Makes the packets of a TCP connection from the client (0) and the serial server (1)."""
+
+    folder: Path
+
+    def __post_init__(self) -> None:
+        self.packets: list[Packet] = []
+        self.next = [1000, 5000]
+
+    def send(self, side: int, text: str, *, at: int | None = None) -> int:
+        """One segment; `at`: sequence number, of one that is out of order or sent again. Returns its number."""
+        data = bytes.fromhex(text)
+        sequence = self.next[side] if at is None else at
+        ends = ("10.0.0.2", 40000), ("10.0.0.9", 4001)
+        (src, sport), (dst, dport) = ends[side], ends[1 - side]
+        packet = (
+            Ether(src="02:00:00:00:00:01", dst="02:00:00:00:00:02")
+            / IP(src=src, dst=dst)
+            / TCP(sport=sport, dport=dport, seq=sequence, ack=self.next[1 - side], flags="PA")
+            / Raw(data)
+        )
+        packet.time = EPOCH + 0.01 * len(self.packets)
+        self.packets.append(packet)
+        if at is None:
+            self.next[side] += len(data)
+        return sequence
+
+    def save(self) -> Path:
+        path = self.folder / "tcp.pcap"
+        wrpcap(str(path), self.packets)
+        return path
+
+
+PORTS = ("-o", "daly.tcp_ports:4001")
+WAYS = {
+    "preference": PORTS,
+    "range": ("-o", "daly.tcp_ports:23,4000-4010"),
+    "decode as": ("-d", "tcp.port==4001,daly"),
+    "heuristic": ("-o", "daly.heuristic:TRUE"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_tcp_serial_server(tshark: Tshark, open_folder: Path, way: str) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    connection.send(1, REPLY)
+    names = [
+        "daly.transport",
+        "daly.direction",
+        "daly.pack.voltage",
+        "daly.request_in",
+        "daly.reply_in",
+        "daly.response_time",
+    ]
+    rows = ask(tshark, connection.save(), "-2", *WAYS[way], names=names)
+    assert rows == [["tcp", "1", "", "", "2", ""], ["tcp", "2", "53.3", "1", "", "0.01"]]
+
+
+def test_tcp_is_left_alone_by_default(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    assert ask(tshark, connection.save(), names=["daly.kind"]) == [[""]]
+
+
+@pytest.mark.parametrize(
+    "other",
+    ["", "474554202f20485454502f312e310d0a", REQUEST[:24], "a5" * 40, a5(0x40, 0x90)[:-2] + "00", REQUEST + "00"],
+)
+def test_the_heuristic_keeps_its_hands_off(tshark: Tshark, open_folder: Path, other: str) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, other or "00")
+    assert ask(tshark, connection.save(), "-o", "daly.heuristic:TRUE", names=["daly.kind"]) == [[""]]
+
+
+@pytest.mark.parametrize("size", [1, 5, 12, 14, 40])
+def test_tcp_frames_cut_anywhere(tshark: Tshark, open_folder: Path, size: int) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, a5(0x40, 0x94) + a5(0x40, 0x95))
+    answer = a5(1, 0x94, "0602") + a5(1, 0x95, "010ce40ce50ce6") + a5(1, 0x95, "020ce70ce80ce9")
+    for start in range(0, len(answer), 2 * size):
+        connection.send(1, answer[start : start + 2 * size])
+    for passes in (), ("-2",):
+        rows = ask(
+            tshark, connection.save(), *passes, *PORTS, names=["daly.data_id", "daly.cells.voltage", "daly.kind"]
+        )
+        assert ",".join(row[0] for row in rows if row[0]) == "0x94,0x95,0x94,0x95,0x95"
+        assert [row[1] for row in rows if row[1]] == ["3300,3301,3302,3303,3304,3305"]
+        assert {kind for row in rows for kind in row[2].split(",") if kind} == {"frame"}
+
+
+def test_tcp_segments_sent_again_count_once(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    connection.send(1, REPLY[:12])
+    again = connection.send(1, REPLY[12:])
+    connection.send(1, REPLY[12:], at=again)
+    rows = ask(tshark, connection.save(), *PORTS, names=["daly.kind"])
+    assert rows == [["frame"], [""], ["frame"], [""]]
+
+
+def test_tcp_segments_out_of_order(tshark: Tshark, open_folder: Path) -> None:
+    """Wireshark puts them in order where its own preference says so."""
+    connection = Connection(open_folder)
+    first = connection.send(1, REPLY)
+    connection.next[1] += 7
+    connection.send(1, REPLY[14:])
+    connection.send(1, REPLY[:14], at=first + 13)
+    words = ("-2", *PORTS, "-o", "tcp.reassemble_out_of_order:TRUE")
+    rows = ask(tshark, connection.save(), *words, names=["daly.kind", "daly.pack.voltage"])
+    assert rows == [["frame", "53.3"], ["", ""], ["frame", "53.3"]]
+
+
+def test_tcp_junk_between_frames_is_kept(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(1, "00ff" + REPLY + "1122" + REPLY + "33")
+    rows = ask(tshark, connection.save(), *PORTS, names=["daly.kind", "daly.undecoded"])
+    assert rows == [["junk,frame,junk,frame,junk", "00ff,1122,33"]]
+
+
+def test_two_connections_are_two_buses(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    connection.send(1, REPLY)
+    other = connection.packets[1].copy()
+    other[TCP].dport = 40001
+    other.time = EPOCH + 0.02
+    connection.packets.append(other)
+    rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.request_in"])
+    assert rows == [[""], ["1"], [""]]
+
+
+D2_READ = "d203000c000157aa"
+
+
+def test_modbus_can_be_switched_off(dissect: Dissect) -> None:
+    assert kinds(dissect([P(D2_READ)])) == ["frame"]
+    assert kinds(dissect([P(D2_READ)], options=["daly.modbus:FALSE"])) == ["junk"]
+    packets = in_a_row(REQUEST + D2_READ + REQUEST)
+    assert kinds(dissect(packets, options=["daly.modbus:FALSE"])) == ["frame+junk+frame"]
+
+
+def test_the_echo_time_is_a_preference(dissect: Dissect) -> None:
+    packets = [P(REQUEST), P(REQUEST, 0.0542)]
+    assert numbers(dissect(packets)[1], "direction") == [3]
+    assert numbers(dissect(packets, options=["daly.echo:30"])[1], "direction") == [1]
