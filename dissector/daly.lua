@@ -101,6 +101,7 @@ function daly.init()
     temperature_tolerance = prefs.temperature_tolerance,
     sum_tolerance = prefs.sum_tolerance,
   }
+  view.init(options)
   serial.init(options)
   tcp.init(options)
 end

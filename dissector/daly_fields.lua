@@ -132,6 +132,13 @@ add("board",          "board",            number("Board",                    "Bo
 add("retry",          "retry",            boolean("Retry",                   "The same request was sent before and is still unanswered; generated"))
 add("request_in",     "request_in",       packet("Request in", frametype.REQUEST, "Packet of the request that this replies to; generated"))
 add("reply_in",       "reply_in",         packet("Reply in", frametype.RESPONSE, "Packet of the first reply to this request, known in a second pass (-2); generated"))
+add("unanswered",     "unanswered",       boolean("Unanswered",              "No reply came while the request waited, known in a second pass (-2); generated (docs/records.md 7)"))
+add("unasked",        "unasked",          boolean("Unasked",                 "Reply that belongs to no request, on a bus where requests are seen; generated (docs/records.md 7)"))
+add("late_to",        "late_to",          packet("Late reply to", frametype.REQUEST, "Packet of the request that this reply came too late for; generated (docs/records.md 7)"))
+add("other_board",    "other_board",      boolean("Another board",           "Another board answers than the request names; generated (docs/records.md 7)"))
+add("second_host",    "second_host",      boolean("Second host",             "Another host than the one before asks on the same bus, within the time a request waits; generated (docs/records.md 7)"))
+add("write",          "write",            boolean("Write",                   "The request writes: 00 restart, D9, DA MOS switches, 10..2A settings; generated, field notes a.3"))
+add("write_result",   "write_result",     text("Result of the write",        "What the reply says of the write: confirmed, denied or answered; generated (docs/records.md 10)"))
 add("response_time",  "response_time",    double("Response time",            "From the request's last byte to the reply's first, s; generated from time stamps, position in the packet and baud rate"))
 
 -- 0x90, V1.2 section 3.
@@ -180,12 +187,37 @@ add("cell_voltage",   "cell.voltage",     plain(u16, "Cell voltage",         "Vo
 add("temperature",    "temperature",      plain(ProtoField.int16, "Temperature", "Temperature of one sensor, C, once per sensor in order; V1.2 0x96 bytes 1-7, offset 40; -40 and 215 mean no sensor"))
 add("missing",        "burst.missing",    number("Missing frame",            "Number of a frame that is missing before this one; generated (docs/records.md 8)"))
 add("again",          "burst.repeat",     boolean("Repeated frame",          "The burst had this frame number before; generated (docs/records.md 8)"))
+add("cut_off",        "burst.cut_off",    boolean("Burst cut off",           "The burst ends here, before its last cell or sensor; known in a second pass (-2); generated (docs/records.md 8)"))
+add("reassembled_in", "reassembled_in",   packet("Put together in", frametype.NONE, "Packet that has the whole table or text of this burst; generated (docs/records.md 8)"))
 add("cells_voltage",  "cells.voltage",    plain(u16, "All cells",            "Voltages of all cells, mV, in order, in the record that completes the burst; generated from 0x95"))
 add("cells_count",    "cells.count",      number("Number of cells",          "Cells in this table; generated from 0x95"))
 add("cells_min",      "cells.min",        plain(u16, "Lowest",               "Lowest of all cells, mV; generated from 0x95"))
 add("cells_max",      "cells.max",        plain(u16, "Highest",              "Highest of all cells, mV; generated from 0x95"))
 add("cells_average",  "cells.average",    double("Average",                  "Average of all cells, mV; generated from 0x95"))
 add("cells_spread",   "cells.spread",     plain(u16, "Spread",               "Highest minus lowest of all cells, mV; generated from 0x95"))
+add("cells_min_number", "cells.min_number", number("Lowest cell",            "Number of the lowest of all cells, the first of equals; generated from 0x95"))
+add("cells_max_number", "cells.max_number", number("Highest cell",           "Number of the highest of all cells, the first of equals; generated from 0x95"))
+for i = 1, 48 do
+  local two = string.format("%02d", i)
+  add("cell." .. i,   "cell." .. two,     plain(u16, "Cell " .. i,           "Voltage of cell " .. i .. ", mV, in the record that has the table of all; generated from 0x95"))
+end
+add("sensors_temperature", "sensors.temperature", plain(ProtoField.int16, "All sensors", "Temperatures of all sensors, C, in order, in the record that completes the burst; -40 and 215 mean no sensor; generated from 0x96"))
+add("sensors_count",  "sensors.count",    number("Number of sensors",        "Sensors in this table; generated from 0x96"))
+add("sensors_min",    "sensors.min",      plain(ProtoField.int16, "Lowest",  "Lowest temperature of the sensors that are there, C; generated from 0x96"))
+add("sensors_max",    "sensors.max",      plain(ProtoField.int16, "Highest", "Highest temperature of the sensors that are there, C; generated from 0x96"))
+add("sensors_average", "sensors.average", double("Average",                  "Average of the sensors that are there, C; generated from 0x96"))
+add("sensors_spread", "sensors.spread",   plain(u16, "Spread",               "Highest minus lowest temperature, C; generated from 0x96"))
+add("sensors_min_number", "sensors.min_number", number("Coldest sensor",     "Number of the coldest sensor that is there, the first of equals; generated from 0x96"))
+add("sensors_max_number", "sensors.max_number", number("Hottest sensor",     "Number of the hottest sensor that is there, the first of equals; generated from 0x96"))
+
+-- Texts over several frames, field notes a.2.
+add("text_part",      "text_part",        text("Part of a text",             "Bytes 1-7 of one frame of a text, other than 20..7E as ?; field notes a.2"))
+add("text.55",        "manufacturer",     text("Manufacturer",               "Manufacturer, put together from the frames of 0x55; field notes a.2"))
+add("text.56",        "battery_name",     text("Battery name",               "Battery name, put together from the frames of 0x56; field notes a.2"))
+add("text.57",        "battery_code",     text("Battery code",               "Battery code or serial number, put together from the frames of 0x57; field notes a.2"))
+add("text.62",        "software_version", text("Software version",           "Software version, put together from the frames of 0x62; field notes a.2"))
+add("text.63",        "hardware_version", text("Hardware version",           "Hardware version, put together from the frames of 0x63; field notes a.2"))
+add("text.6A",        "serial_number",    text("Serial number",              "Serial number, put together from the frames of 0x6A; field notes a.2"))
 
 -- 0x97.
 add("balance_mask",   "balance.mask",     hex(ProtoField.uint64, "Balance mask", "Bit 0 = cell 1: 0 closed, 1 open; V1.2 0x97 bits 0-47"))
@@ -201,6 +233,12 @@ add("fault_code",     "fault_code",       number("Fault code",               "Fa
 add("fault_count",    "fault_count",      number("Faults",                   "How many of the paper's 48 fault bits are set; generated"))
 add("fault_raised",   "fault_raised",     text("Raised",                     "Name of a bit that came since the last 0x98 of this board; generated"))
 add("fault_cleared",  "fault_cleared",    text("Cleared",                    "Name of a bit that went since the last 0x98 of this board; generated"))
+
+-- What changed since the record before of this kind, and what contradicts another; docs/records.md 9, 11.
+add("changed",        "changed",          text("Changed",                    "What changed since the last 0x93 or 0x94 of this board: state, charge_mos, discharge_mos, cell_count, sensor_count, charger, load; generated"))
+add("changed_from",   "changed_from",     packet("Changed since", frametype.NONE, "Packet of the record before of this kind of this board; generated"))
+add("contradiction",  "contradiction",    text("Contradiction",              "What this record says otherwise than another of this board: pack_voltage, cell_max, cell_min, cell_number, temperature_max, temperature_min, sensor_number; generated"))
+add("contradicts",    "contradicts",      packet("Contradicts", frametype.NONE, "Packet of that other record; generated"))
 
 add("reserved",       "reserved",         bytes("Reserved",                  "Reserved bytes and slots of no cell: stale bytes on many boards (field notes fact 2)"))
 
@@ -223,6 +261,21 @@ M.experts = {
   echo = ProtoExpert.new("daly.echo", "Echo of the request: the BMS sleeps, or the adapter hears itself", expert.group.RESPONSE_CODE, expert.severity.NOTE),
   severe = ProtoExpert.new("daly.fault.severe", "Level 2 fault", expert.group.RESPONSE_CODE, expert.severity.WARN),
   missing = ProtoExpert.new("daly.burst.incomplete", "Frame missing in a burst", expert.group.SEQUENCE, expert.severity.WARN),
+  cut_off = ProtoExpert.new("daly.burst.short", "Burst is cut off", expert.group.SEQUENCE, expert.severity.WARN),
+  unanswered = ProtoExpert.new("daly.no_reply", "No reply", expert.group.SEQUENCE, expert.severity.WARN),
+  unasked = ProtoExpert.new("daly.no_request", "Nobody asked for this reply, or the request was damaged", expert.group.SEQUENCE, expert.severity.NOTE),
+  late = ProtoExpert.new("daly.late", "Late reply", expert.group.SEQUENCE, expert.severity.WARN),
+  slow = ProtoExpert.new("daly.slow", "Slow reply", expert.group.SEQUENCE, expert.severity.NOTE),
+  retry = ProtoExpert.new("daly.resent", "Request sent again, still unanswered", expert.group.SEQUENCE, expert.severity.NOTE),
+  other_board = ProtoExpert.new("daly.wrong_board", "Another board answers than was asked", expert.group.PROTOCOL, expert.severity.WARN),
+  second_host = ProtoExpert.new("daly.two_hosts", "Two hosts ask on this bus", expert.group.PROTOCOL, expert.severity.WARN),
+  write = ProtoExpert.new("daly.writes", "Request that writes", expert.group.REQUEST_CODE, expert.severity.WARN),
+  confirmed = ProtoExpert.new("daly.write.confirmed", "The board confirms the write", expert.group.RESPONSE_CODE, expert.severity.NOTE),
+  denied = ProtoExpert.new("daly.write.denied", "The board denies the write", expert.group.RESPONSE_CODE, expert.severity.ERROR),
+  raised = ProtoExpert.new("daly.fault.raised", "Fault raised", expert.group.RESPONSE_CODE, expert.severity.WARN),
+  cleared = ProtoExpert.new("daly.fault.cleared", "Fault cleared", expert.group.RESPONSE_CODE, expert.severity.NOTE),
+  changed = ProtoExpert.new("daly.switched", "State or switch changed", expert.group.RESPONSE_CODE, expert.severity.NOTE),
+  contradiction = ProtoExpert.new("daly.contradictory", "Two records contradict each other", expert.group.PROTOCOL, expert.severity.WARN),
   again = ProtoExpert.new("daly.burst.repeated", "Frame repeated in a burst", expert.group.SEQUENCE, expert.severity.WARN),
 }
 

@@ -3,11 +3,11 @@
 -- The eight data bytes of a reply, by data ID (paper, section 3): as fields of the tree, and as words for the Info
 -- column. All numbers of several bytes are big-endian.
 --
---   M.show[id](frame, out)     adds the fields
---   M.words[id](frame)         returns the words
+--   M.show[id](frame, out, from)   adds the fields; from: packet of the record before, of a changed 0x98
+--   M.words[id](frame)             returns the words
 --
--- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, cells = table of all cells or nil }; data
--- byte 0 is the fifth byte of raw. `out` adds:
+-- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, table = list of all cells or sensors of its
+-- burst, text = all of its burst, or nil }; data byte 0 is the fifth byte of raw. `out` adds:
 --
 --   out.bytes(field, byte, length, unit)            the bytes as they are
 --   out.value(field, byte, length, value, unit)     a value computed from them
@@ -17,7 +17,7 @@
 local fields = require("daly_fields").fields
 local data_ids = require("daly_fields")
 local faults = require("daly_faults")
-local bus = require("daly_bus")
+local bursts = require("daly_bursts")
 
 local M = { show = {}, words = {} }
 local show, words = M.show, M.words
@@ -172,34 +172,56 @@ local function real_slots(burst, frame, per_frame)
   return math.max(0, math.min(per_frame, burst.count - first)), first
 end
 
---- The table of all cells, if this frame carries it: a list of mV. `again`: the capture was read to its end.
-function M.cells(slot, memory, again)
-  if not memory then
-    return nil
-  end
-  if memory.table then
-    return memory.table
-  end
-  local burst = memory.burst or memory
-  if again and burst.id == 0x95 and not burst.count and burst.last == slot and burst.whole then
-    return burst.cells
-  end
-  return nil
+-- A text's bytes as they can be shown.
+local function printable(bytes)
+  return (bytes:gsub("[^\x20-\x7E]", "?"))
 end
 
-local function statistics(cells)
-  local lowest, highest, sum = cells[1], cells[1], 0
-  for i = 1, #cells do
-    local v = cells[i]
-    sum = sum + v
-    if v < lowest then
-      lowest = v
+-- The text of a whole burst, nil when there is nothing in it.
+local function text_of(burst)
+  local parts = {}
+  for number = burst.base, burst.number do
+    parts[#parts + 1] = burst.texts[number]
+  end
+  local bytes = concat(parts):match("^(.-)[%z\xFF\x20]*$")
+  return bytes ~= "" and printable(bytes) or nil
+end
+
+--- What this frame carries of its whole burst: the list of all cells (mV) or sensors (raw), the text; nil, nil where
+-- another carries it, or none. `again`: the capture was read to its end.
+function M.whole(slot, memory, again)
+  if not memory then
+    return nil, nil
+  end
+  if memory.table then
+    return memory.table, nil
+  end
+  local burst = memory.burst or memory
+  if again and burst.last == slot and burst.whole and not burst.count then
+    if burst.values then
+      return burst.values, nil
     end
-    if v > highest then
-      highest = v
+    return nil, text_of(burst)
+  end
+  return nil, nil
+end
+
+-- Lowest, its number, highest, its number, average of a list, without values that mean "not there"; nil where none is.
+local function statistics(values, one_absent, other_absent)
+  local lowest, low_at, highest, high_at, sum, count = nil, nil, nil, nil, 0, 0
+  for i = 1, #values do
+    local v = values[i]
+    if v ~= one_absent and v ~= other_absent then
+      sum, count = sum + v, count + 1
+      if not lowest or v < lowest then
+        lowest, low_at = v, i
+      end
+      if not highest or v > highest then
+        highest, high_at = v, i
+      end
     end
   end
-  return lowest, highest, sum / #cells
+  return lowest, low_at, highest, high_at, count > 0 and sum / count
 end
 
 -- 0x95: frame_number.1 cell.2 cell.2 cell.2 reserved.1
@@ -217,15 +239,17 @@ show[0x95] = function(frame, out)
     out.cell(fields.cell_voltage, 1 + 2 * i, 2, before + i + 1, high * 256 + low)
   end
   out.bytes(fields.reserved, 1 + 2 * real, 7 - 2 * real)
-  local cells = frame.cells
+  local cells = frame.table
   if cells then
-    local lowest, highest, average = statistics(cells)
+    local lowest, low_at, highest, high_at, average = statistics(cells)
     for i = 1, #cells do
-      out.made_cell(fields.cells_voltage, i, cells[i])
+      out.made_cell(fields.cells_voltage, fields["cell." .. i], cells[i], i == low_at, i == high_at)
     end
     out.made(fields.cells_count, #cells)
     out.made(fields.cells_min, lowest, " mV")
+    out.made(fields.cells_min_number, low_at)
     out.made(fields.cells_max, highest, " mV")
+    out.made(fields.cells_max_number, high_at)
     out.made(fields.cells_average, average, " mV")
     out.made(fields.cells_spread, highest - lowest, " mV")
   end
@@ -247,11 +271,19 @@ words[0x95] = function(frame)
     end
     list[#list + 1] = "mV"
   end
-  local cells = frame.cells
+  local cells = frame.table
   if cells then
-    local lowest, highest, average = statistics(cells)
-    list[#list + 1] =
-      format(" all %d: min %d  max %d  average %.0f  spread %d mV", #cells, lowest, highest, average, highest - lowest)
+    local lowest, low_at, highest, high_at, average = statistics(cells)
+    list[#list + 1] = format(
+      " all %d: min %d (cell %d)  max %d (cell %d)  average %.0f  spread %d mV",
+      #cells,
+      lowest,
+      low_at,
+      highest,
+      high_at,
+      average,
+      highest - lowest
+    )
   end
   return concat(list, " ")
 end
@@ -271,6 +303,22 @@ show[0x96] = function(frame, out)
   end
   if real < 7 then
     out.bytes(fields.reserved, 1 + real, 7 - real)
+  end
+  local sensors = frame.table
+  if sensors then
+    for i = 1, #sensors do
+      out.made(fields.sensors_temperature, sensors[i] - 40, " C")
+    end
+    out.made(fields.sensors_count, #sensors)
+    local lowest, low_at, highest, high_at, average = statistics(sensors, 0, 0xFF)
+    if lowest then
+      out.made(fields.sensors_min, lowest - 40, " C")
+      out.made(fields.sensors_min_number, low_at)
+      out.made(fields.sensors_max, highest - 40, " C")
+      out.made(fields.sensors_max_number, high_at)
+      out.made(fields.sensors_average, average - 40, " C")
+      out.made(fields.sensors_spread, highest - lowest, " C")
+    end
   end
 end
 
@@ -323,7 +371,7 @@ words[0x97] = function(frame)
 end
 
 -- 0x98: bits.7 code.1
-show[0x98] = function(frame, out)
+show[0x98] = function(frame, out, from)
   local raw = frame.raw
   for i = 1, #faults.BITS do
     local bit = faults.BITS[i]
@@ -339,6 +387,9 @@ show[0x98] = function(frame, out)
     end
     for i = 1, #cleared do
       out.made(fields.fault_cleared, cleared[i])
+    end
+    if #raised + #cleared > 0 then
+      out.made(fields.changed_from, from)
     end
   end
 end
@@ -368,21 +419,85 @@ words[0x98] = function(frame)
   return concat(list, "  ")
 end
 
--- Texts over several frames: the characters are put together in a later version; the frame's number tells its place.
+-- Texts: frame_number.1 characters.7
 local function show_text(frame, out)
   local _, odd = burst_of(frame)
   out.bytes(fields.frame_number, 0, 1)
+  out.value(fields.text_part, 1, 7, printable(frame.raw:sub(6, 12)))
   show_burst(odd, out)
+  if frame.text then
+    out.made(fields[format("text.%02X", byte(frame.raw, 3))], frame.text)
+  end
 end
 
-for id in pairs(bus.BURST_IDS) do
+local function text_words(frame)
+  local list = { format('frame %d  "%s"', byte(frame.raw, 5), printable(frame.raw:sub(6, 12))) }
+  if frame.text then
+    list[2] = format('all: "%s"', frame.text)
+  end
+  return concat(list, "  ")
+end
+
+for id in pairs(bursts.IDS) do
   show[id] = show[id] or show_text
+  words[id] = words[id] or text_words
 end
 
---- What is wrong with a reply: a list of { expert's name, words }.
+-- Requests that write: what they would change, byte by byte where that is known (field notes a.3).
+local function switches(what)
+  return function(raw)
+    local value = byte(raw, 5)
+    if value > 1 then
+      return format("%s to %d", what, value)
+    end
+    -- 01 is on on every device seen; the vendor's article of 2024 has it the other way round.
+    return format("switches the %s %s", what, value == 1 and "on" or "off")
+  end
+end
+
+local WRITES = {
+  [0x00] = function()
+    return "restarts the board"
+  end,
+  [0xD9] = switches("discharge MOS"),
+  [0xDA] = switches("charge MOS"),
+  [0x21] = function(raw)
+    local _, _, _, _, year, month, day, hour, minute, second, high, low = byte(raw, 1, 12)
+    return format(
+      "sets the clock to %02d-%02d-%02d %02d:%02d:%02d, SOC to %.1f %%",
+      year,
+      month,
+      day,
+      hour,
+      minute,
+      second,
+      (high * 256 + low) / 10
+    )
+  end,
+}
+
+--- What a request that writes would change, in words.
+function M.write_words(id, raw)
+  local known = WRITES[id]
+  if known then
+    return known(raw)
+  end
+  return format("sets what 0x%02X reads", id + 0x40)
+end
+
+--- What is to be said of a reply's content: a list of { expert's name, words }.
 function M.complaints(id, frame)
   local list = {}
   if id == 0x98 then
+    if frame.memory then
+      local raised, cleared = faults.changes(frame.memory, 1, frame.raw, 5)
+      if #raised > 0 then
+        list[1] = { "raised", "Raised: " .. concat(raised, ", ") }
+      end
+      if #cleared > 0 then
+        list[#list + 1] = { "cleared", "Cleared: " .. concat(cleared, ", ") }
+      end
+    end
     local data = frame.raw:sub(5, 12)
     if data ~= NO_FAULTS then
       local names, _, severe = faults.read(frame.raw, 5)
@@ -393,10 +508,10 @@ function M.complaints(id, frame)
             level_2[#level_2 + 1] = names[i]
           end
         end
-        list[1] = { "severe", "Level 2 fault: " .. concat(level_2, ", ") }
+        list[#list + 1] = { "severe", "Level 2 fault: " .. concat(level_2, ", ") }
       end
     end
-  elseif bus.BURST_IDS[id] then
+  elseif bursts.IDS[id] then
     local _, odd = burst_of(frame)
     if odd and odd.missing then
       list[#list + 1] = { "missing", format("%d missing before this frame of the burst", #odd.missing) }

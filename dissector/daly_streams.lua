@@ -15,6 +15,7 @@
 
 local records = require("daly_records")
 local bus_module = require("daly_bus")
+local results_module = require("daly_results")
 
 local M = {}
 
@@ -24,7 +25,8 @@ local byte, find, sub = string.byte, string.find, string.sub
 local INNER_A5 = "\xA5"
 local INNER_MODBUS = "[\xD2\x51-\x60\x81-\x90][\x03\x06\x10\x83\x86\x90]"
 
---- Everything known of one capture. `options`: baud; quiet, echo, reply, burst in seconds.
+--- Everything known of one capture. `options`: baud; quiet, echo, reply, late, slow, burst, age in seconds; tolerances:
+-- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance (%).
 function M.capture(options)
   return {
     options = options,
@@ -32,7 +34,7 @@ function M.capture(options)
     streams = {}, -- by key
     buses = {}, -- by name
     plans = {}, -- by packet number
-    results = bus_module.results(),
+    results = results_module.new(),
     slots = 0, -- slots given to frames that are not a packet's only content, counted down from -1
   }
 end

@@ -4,6 +4,8 @@
 
 local field_module = require("daly_fields")
 local payload = require("daly_payload")
+local bursts = require("daly_bursts")
+local exchange = require("daly_exchange")
 
 local M = {}
 
@@ -21,9 +23,17 @@ local packet_comment = Field.new("frame.comment")
 -- and whether somebody looks at the tree; whether the capture was read to its end; the medium.
 local daly, results, wanted, visible, again, transport
 
+-- Replies that took longer get a note, s.
+local slow = 0.5
+
 --- Once: the protocol, which the items of the tree belong to.
 function M.setup(proto)
   daly = proto
+end
+
+--- What a slow reply is, s.
+function M.init(options)
+  slow = options.slow
 end
 
 --- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
@@ -75,11 +85,18 @@ function out.cell(field, first, length, number, value)
   end
 end
 
-function out.made_cell(field, number, value)
+-- One cell of the table, as one of all and by its own field.
+function out.made_cell(field, own, value, lowest, highest)
   if visible or referenced(tree, field) then
     local item = add(tree, field, value):set_generated()
     if visible then
-      item:set_text(format("Cell %d: %d mV", number, value))
+      item:set_hidden() -- its own field shows it
+    end
+  end
+  if visible or referenced(tree, own) then
+    local item = add(tree, own, value):set_generated()
+    if visible then
+      item:append_text(lowest and highest and " mV" or lowest and " mV, lowest" or highest and " mV, highest" or " mV")
     end
   end
 end
@@ -170,63 +187,184 @@ end
 
 local frame = {} -- the one at hand, for daly_payload
 
+-- What a frame's rare things say (daly_results' odd): expert notes.
+local function note_odd(item, odd, id)
+  if odd.late_to then
+    item:add_proto_expert_info(experts.late, format("Too late for the request in packet %d", odd.late_to))
+  elseif odd.unasked then
+    item:add_proto_expert_info(experts.unasked)
+  end
+  if odd.other_board then
+    item:add_proto_expert_info(experts.other_board, format("Board %d was asked", odd.other_board))
+  end
+  if odd.second_host then
+    item:add_proto_expert_info(experts.second_host)
+  end
+  if odd.result and odd.result ~= "answered" then
+    item:add_proto_expert_info(
+      experts[odd.result],
+      format("Write 0x%02X: the board %s it", id, odd.result == "denied" and "denies" or "confirms")
+    )
+  end
+  if odd.changed then
+    item:add_proto_expert_info(
+      experts.changed,
+      format("Changed since packet %d: %s", odd.from, concat(odd.changed, ", "):gsub("_", " "))
+    )
+  end
+  local contradictions = odd.contradictions
+  for i = 1, contradictions and #contradictions or 0, 3 do
+    item:add_proto_expert_info(
+      experts.contradiction,
+      format("%s (packet %d)", contradictions[i + 2], contradictions[i + 1])
+    )
+  end
+end
+
+-- The same as fields.
+local function show_odd(odd)
+  if odd.unasked then
+    made(fields.unasked, true)
+  end
+  if odd.late_to then
+    made(fields.late_to, odd.late_to)
+  end
+  if odd.other_board then
+    made(fields.other_board, true)
+  end
+  if odd.second_host then
+    made(fields.second_host, true)
+  end
+  if odd.result then
+    made(fields.write_result, odd.result)
+  end
+  for i = 1, odd.changed and #odd.changed or 0 do
+    made(fields.changed, odd.changed[i])
+  end
+  if odd.changed then
+    made(fields.changed_from, odd.from)
+  end
+  local contradictions = odd.contradictions
+  for i = 1, contradictions and #contradictions or 0, 3 do
+    made(fields.contradiction, contradictions[i])
+    made(fields.contradicts, contradictions[i + 1])
+  end
+end
+
+-- A request (echo, retry): expert notes and fields of its own; returns its words.
+local function request(item, raw, slot, id, flag, text)
+  local unanswered
+  if flag == "echo" then
+    text = text:gsub("^Request", "Echo")
+    item:add_proto_expert_info(experts.echo)
+  else
+    if exchange.is_write(id) then
+      local words = payload.write_words(id, raw)
+      item:add_proto_expert_info(experts.write, "WRITE: " .. words)
+      text = format("WRITE%s: %s", text:gsub("^Request", ""), words)
+    end
+    if flag == "retry" then
+      text = text .. "  [retry]"
+      item:add_proto_expert_info(experts.retry)
+    end
+    if again and exchange.is_unanswered(results, slot) then
+      unanswered = true
+      text = text .. "  [unanswered]"
+      item:add_proto_expert_info(experts.unanswered)
+    end
+  end
+  if wanted then
+    if flag ~= "echo" and exchange.is_write(id) then
+      made(fields.write, true)
+    end
+    if flag == "retry" then
+      made(fields.retry, true)
+    end
+    if unanswered then
+      made(fields.unanswered, true)
+    end
+  end
+  return text
+end
+
+-- A reply of several frames: how it lies in its burst.
+local function show_place(slot)
+  local whole_in = bursts.whole_in(results, slot, again)
+  if whole_in then
+    made(fields.reassembled_in, whole_in)
+  end
+end
+
 -- An A5 frame: fields, expert notes; returns words, source, destination.
 local function a5(item, raw, slot)
   local address, id = byte(raw, 2, 3)
-  local flag = results.flag[slot]
-  local beginning, source, destination = names_of(address, id)
+  local flag, odd = results.flag[slot], results.odd[slot]
+  local text, source, destination = names_of(address, id)
   local reply = address < 0x20
-  local text
-  local memory = results.memory[slot]
-  frame.raw = raw
-  if reply then
-    frame.memory = memory
-    frame.cells = id == 0x95 and payload.cells(slot, memory, again) or nil
-    local words = payload.words[id]
-    if words then
-      text = beginning .. words(frame)
-    else
-      text = beginning .. hex_words(raw, 5, 12)
+  local wait = results.wait[slot]
+  if wanted then
+    show_frame(1)
+    made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
+    local board = board_of(address)
+    if board then
+      made(fields.board, board)
     end
-  elseif flag == "echo" then
-    text = beginning:gsub("^Request", "Echo")
-    source, destination = "Echo", source
-    item:add_proto_expert_info(experts.echo)
-  elseif flag == "retry" then
-    text = beginning .. "  [retry]"
-  else
-    text = beginning
+    local link = results.link[slot]
+    if link then
+      made(reply and fields.request_in or fields.reply_in, link)
+    end
   end
   if reply then
+    local memory = results.memory[slot]
+    frame.raw, frame.memory, frame.table, frame.text = raw, memory, nil, nil
+    local numbered = bursts.IDS[id]
+    if numbered then
+      frame.table, frame.text = payload.whole(slot, memory, again)
+    end
+    local words = payload.words[id]
+    text = text .. (words and words(frame) or hex_words(raw, 5, 12))
     if id == 0x98 or (type(memory) == "table" and memory.burst) then
       local complaints = payload.complaints(id, frame)
       for i = 1, #complaints do
         item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
       end
     end
+    if wait and wait >= 0 then
+      if wait > slow then
+        item:add_proto_expert_info(experts.slow, format("The reply came %.3f s after the request", wait))
+      end
+      if wanted then
+        made(fields.response_time, wait, " s")
+      end
+    end
+    local cut_off = numbered and again and bursts.is_cut_off(results, slot)
+    if cut_off then
+      item:add_proto_expert_info(experts.cut_off)
+    end
+    if wanted then
+      if numbered then
+        show_place(slot)
+        if cut_off then
+          made(fields.cut_off, true)
+        end
+      end
+      if payload.show[id] then
+        payload.show[id](frame, out, odd and odd.from)
+      end
+    end
+  else
+    if flag or again or exchange.is_write(id) then
+      text = request(item, raw, slot, id, flag, text)
+    end
+    if flag == "echo" then
+      source, destination = "Echo", source
+    end
   end
-  if not wanted then
-    return text, source, destination
-  end
-  show_frame(1)
-  made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
-  local board = board_of(address)
-  if board then
-    made(fields.board, board)
-  end
-  if flag == "retry" then
-    made(fields.retry, true)
-  end
-  local link = results.link[slot]
-  if link then
-    made(reply and fields.request_in or fields.reply_in, link)
-  end
-  local wait = results.wait[slot]
-  if wait then
-    made(fields.response_time, wait, " s")
-  end
-  if reply and payload.show[id] then
-    payload.show[id](frame, out)
+  if odd then
+    note_odd(item, odd, id)
+    if wanted then
+      show_odd(odd)
+    end
   end
   return text, source, destination
 end

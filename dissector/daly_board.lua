@@ -1,0 +1,274 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- What is remembered of each board (address byte of replies) on a bus: what changed since, and what contradicts what
+-- (docs/records.md 9, 11). Pure Lua, no Wireshark. Times are seconds.
+--
+--   0x90  pack voltage ----- 1 % ------ sum of the table of 0x95
+--   0x91  highest, lowest -- 20 mV ---- table of 0x95;  numbers -- count of 0x94
+--   0x92  highest, lowest -- 2 C ------ table of 0x96;  numbers -- count of 0x94
+
+local results_module = require("daly_results")
+local exchange = require("daly_exchange")
+
+local M = {}
+
+local byte, sub, format = string.byte, string.sub, string.format
+local GRACE = exchange.GRACE
+
+local MOST_CELLS, MOST_SENSORS = 48, 21
+
+local function board_of(state, address)
+  local board = state.boards[address]
+  if not board then
+    board = {}
+    state.boards[address] = board
+  end
+  return board
+end
+
+local function contradict(results, slot, name, packet, words)
+  local odd = results_module.odd(results, slot)
+  local list = odd.contradictions or {}
+  odd.contradictions = list
+  local n = #list
+  list[n + 1], list[n + 2], list[n + 3] = name, packet, words
+end
+
+local function change(results, slot, name, from)
+  local odd = results_module.odd(results, slot)
+  odd.changed = odd.changed or {}
+  odd.changed[#odd.changed + 1] = name
+  odd.from = from
+end
+
+-- Whether another record (or none) is new enough to say something about the same moment.
+local function is_new(bus, other, starts)
+  return other and starts - other.ended <= bus.times.age + GRACE
+end
+
+local function keep(board, name, packet, ends)
+  local other = board[name]
+  if not other then
+    other = {}
+    board[name] = other
+  end
+  other.packet, other.ended = packet, ends
+  return other
+end
+
+-- Two voltages of cells, mV; nothing to say where the highest of one side is 0 (after wake-up).
+local function compare_cells(bus, slot, mine, theirs, what)
+  if mine.max == 0 or theirs.max == 0 then
+    return
+  end
+  local tolerance = bus.times.cell_tolerance
+  if math.abs(mine.max - theirs.max) > tolerance then
+    contradict(
+      bus.results,
+      slot,
+      "cell_max",
+      theirs.packet,
+      format("Highest cell is %d mV here, %d mV in %s", mine.max, theirs.max, what)
+    )
+  end
+  if math.abs(mine.min - theirs.min) > tolerance then
+    contradict(
+      bus.results,
+      slot,
+      "cell_min",
+      theirs.packet,
+      format("Lowest cell is %d mV here, %d mV in %s", mine.min, theirs.min, what)
+    )
+  end
+end
+
+-- Pack voltage (raw, 0.1 V) against the sum of cells (mV).
+local function compare_sum(bus, slot, raw, sum, packet, what)
+  if raw > 0 and sum > 0 and math.abs(raw * 100 - sum) * 100 > bus.times.sum_tolerance * sum then
+    contradict(
+      bus.results,
+      slot,
+      "pack_voltage",
+      packet,
+      format("Pack voltage is %.1f V, the cells sum up to %.3f V, %s", raw / 10, sum / 1000, what)
+    )
+  end
+end
+
+-- A sensor that is not there: raw 0 or FF.
+local function is_there(raw)
+  return raw ~= 0 and raw ~= 0xFF
+end
+
+-- Raw bytes of the highest and lowest temperature: `mine` against the table or the other way round. `single`: the side
+-- that is 0x92, whose minimum says nothing where it equals its maximum.
+local function compare_temperatures(bus, slot, mine, theirs, single, what)
+  local tolerance = bus.times.temperature_tolerance
+  if is_there(single.max) and math.abs(mine.max - theirs.max) > tolerance then
+    contradict(
+      bus.results,
+      slot,
+      "temperature_max",
+      theirs.packet,
+      format("Highest temperature is %d C here, %d C in %s", mine.max - 40, theirs.max - 40, what)
+    )
+  end
+  if is_there(single.min) and single.min ~= single.max and math.abs(mine.min - theirs.min) > tolerance then
+    contradict(
+      bus.results,
+      slot,
+      "temperature_min",
+      theirs.packet,
+      format("Lowest temperature is %d C here, %d C in %s", mine.min - 40, theirs.min - 40, what)
+    )
+  end
+end
+
+-- A number of a cell or sensor that the board does not have by its own count.
+local function compare_number(bus, slot, name, one, other, count, packet)
+  if count and (one > count or other > count) then
+    local words = format("Number %d, and there are %d by 0x94", math.max(one, other), count)
+    contradict(bus.results, slot, name, packet, words)
+  end
+end
+
+local take = {} -- by ID; returns what the frame is shown with, or nil
+
+take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
+  local high, low = byte(raw, 5, 6)
+  local voltage = high * 256 + low
+  local mine = keep(board, "pack", packet, ends)
+  mine.raw = voltage
+  local cells = board.all_cells
+  if is_new(bus, cells, starts) then
+    compare_sum(bus, slot, voltage, cells.sum, cells.packet, "the newest table of 0x95")
+  end
+  return board.state
+end
+
+take[0x91] = function(bus, board, slot, packet, raw, starts, ends)
+  local a, b, highest, d, e, lowest = byte(raw, 5, 10)
+  local mine = keep(board, "cell_extremes", packet, ends)
+  mine.max, mine.min = a * 256 + b, d * 256 + e
+  if is_new(bus, board.all_cells, starts) then
+    compare_cells(bus, slot, mine, board.all_cells, "the newest table of 0x95")
+  end
+  compare_number(bus, slot, "cell_number", highest, lowest, board.cells, board.cells_in)
+end
+
+take[0x92] = function(bus, board, slot, packet, raw, starts, ends)
+  local max, highest, min, lowest = byte(raw, 5, 8)
+  local mine = keep(board, "temperature_extremes", packet, ends)
+  mine.max, mine.min = max, min
+  if is_new(bus, board.all_sensors, starts) then
+    compare_temperatures(bus, slot, mine, board.all_sensors, mine, "the newest table of 0x96")
+  end
+  compare_number(bus, slot, "sensor_number", highest, lowest, board.sensors, board.sensors_in)
+end
+
+take[0x93] = function(bus, board, slot, packet, raw)
+  local state, charge, discharge = byte(raw, 5, 7)
+  charge, discharge = charge ~= 0, discharge ~= 0
+  local before = board.mos_in
+  if before then
+    if state ~= board.state then
+      change(bus.results, slot, "state", before)
+    end
+    if charge ~= board.charge then
+      change(bus.results, slot, "charge_mos", before)
+    end
+    if discharge ~= board.discharge then
+      change(bus.results, slot, "discharge_mos", before)
+    end
+  end
+  board.state, board.charge, board.discharge, board.mos_in = state, charge, discharge, packet
+end
+
+take[0x94] = function(bus, board, slot, packet, raw)
+  local cells, sensors, charger, load = byte(raw, 5, 8)
+  charger, load = charger ~= 0, load ~= 0
+  local before = board.status_in
+  if cells >= 1 and cells <= MOST_CELLS then
+    if board.cells and board.cells ~= cells then
+      change(bus.results, slot, "cell_count", before)
+    end
+    board.cells, board.cells_in = cells, packet
+  end
+  if sensors >= 1 and sensors <= MOST_SENSORS then
+    if board.sensors and board.sensors ~= sensors then
+      change(bus.results, slot, "sensor_count", before)
+    end
+    board.sensors, board.sensors_in = sensors, packet
+  end
+  if before then
+    if charger ~= board.charger then
+      change(bus.results, slot, "charger", before)
+    end
+    if load ~= board.load then
+      change(bus.results, slot, "load", before)
+    end
+  end
+  board.charger, board.load, board.status_in = charger, load, packet
+end
+
+take[0x98] = function(bus, board, slot, packet, raw)
+  local data, before = sub(raw, 5, 12), board.faults
+  if before and before ~= data then
+    results_module.odd(bus.results, slot).from = board.faults_in
+  end
+  board.faults, board.faults_in = data, packet
+  return before
+end
+
+--- A reply that is one frame. Returns what it is shown with (daly_results), or nil.
+function M.feed(bus, slot, packet, raw, address, id, starts, ends)
+  local known = take[id]
+  return known and known(bus, board_of(bus.state, address), slot, packet, raw, starts, ends)
+end
+
+--- A table of all cells (mV) or sensors (raw) of a board with a known count is complete in this packet.
+function M.feed_table(bus, slot, packet, values, address, id, starts, ends)
+  local board = board_of(bus.state, address)
+  if id == 0x95 then
+    local mine = keep(board, "all_cells", packet, ends)
+    local max, min, sum = values[1], values[1], 0
+    for i = 1, #values do
+      local value = values[i]
+      sum = sum + value
+      if value > max then
+        max = value
+      end
+      if value < min then
+        min = value
+      end
+    end
+    mine.max, mine.min, mine.sum = max, min, sum
+    if is_new(bus, board.cell_extremes, starts) then
+      compare_cells(bus, slot, mine, board.cell_extremes, "the newest 0x91")
+    end
+    local pack = board.pack
+    if is_new(bus, pack, starts) then
+      compare_sum(bus, slot, pack.raw, sum, pack.packet, "the newest 0x90")
+    end
+    return
+  end
+  local max, min
+  for i = 1, #values do
+    local value = values[i]
+    if is_there(value) then
+      max = max and math.max(max, value) or value
+      min = min and math.min(min, value) or value
+    end
+  end
+  if not max then
+    board.all_sensors = nil
+    return
+  end
+  local mine = keep(board, "all_sensors", packet, ends)
+  mine.max, mine.min = max, min
+  if is_new(bus, board.temperature_extremes, starts) then
+    compare_temperatures(bus, slot, mine, board.temperature_extremes, board.temperature_extremes, "the newest 0x92")
+  end
+end
+
+return M

@@ -1,0 +1,213 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Answers in several frames, numbered in data byte 0, put together (docs/records.md 8). Pure Lua, no Wireshark.
+--
+--   request 95    reply 1   reply 2   reply 3   reply 4   reply 5    request 96 ...
+--                |<------------------ burst ------------------>|
+--                 link: the request                     table of 14 cells, when 0x94 said that there are 14
+
+local exchange = require("daly_exchange")
+local results_module = require("daly_results")
+
+local M = {}
+
+local byte = string.byte
+local GRACE = exchange.GRACE
+local later = results_module.later
+
+-- IDs that answer in several numbered frames, and the highest number with base 1 (texts: none is known).
+local IDS = {
+  [0x95] = 16,
+  [0x96] = 3,
+  [0x55] = 254,
+  [0x56] = 254,
+  [0x57] = 254,
+  [0x62] = 254,
+  [0x63] = 254,
+  [0x6A] = 254,
+}
+
+M.IDS = IDS
+
+-- Values in one frame.
+local PER_FRAME = { [0x95] = 3, [0x96] = 7 }
+
+-- What a frame is shown by whose burst has a known count, { base =, count = }: one for all such bursts.
+local shapes = { [0] = {}, [1] = {} }
+
+local function shape_of(base, count)
+  local shape = shapes[base][count]
+  if not shape then
+    shape = { base = base, count = count }
+    shapes[base][count] = shape
+  end
+  return shape
+end
+
+-- Slots of a 0x95 (mV) or 0x96 (raw) frame into the burst; the table of all, when this frame holds the last one and
+-- none is missing.
+local function note_values(burst, raw, number)
+  local values = burst.values
+  local first
+  if burst.id == 0x95 then
+    local _, _, _, _, _, a, b, c, d, e, f = byte(raw, 1, 11)
+    first = 3 * (number - burst.base) + 1
+    values[first], values[first + 1], values[first + 2] = a * 256 + b, c * 256 + d, e * 256 + f
+  else
+    first = 7 * (number - burst.base) + 1
+    for i = 0, 6 do
+      values[first + i] = byte(raw, 6 + i)
+    end
+  end
+  local count = burst.count
+  if count and count >= first and count < first + burst.per_frame and burst.whole then
+    local list = {}
+    for i = 1, count do
+      list[i] = values[i]
+    end
+    return list
+  end
+  return nil
+end
+
+--- Whether a burst with a known count has not reached its last cell or sensor.
+function M.falls_short(burst)
+  return burst.count and burst.per_frame * (burst.number - burst.base + 1) < burst.count
+end
+
+--- The running burst of a bus is over.
+function M.finish(bus)
+  local burst = bus.state.burst
+  if burst then
+    bus.state.burst = nil
+    if M.falls_short(burst) then
+      local odd = bus.results.odd[burst.last]
+      local with = { cut_off = true }
+      for k, v in pairs(odd or {}) do
+        with[k] = v
+      end
+      later(bus, "odd", burst.last, with)
+    end
+  end
+end
+
+-- The table stands in packet `number`: tell the frames before.
+local function link_parts(bus, burst, number)
+  burst.table_in = number
+  for i = 1, #burst.parts do
+    local slot = burst.parts[i]
+    if bus.results.wait[slot] then -- a response time
+      later(bus, "whole_in", slot, number)
+    else
+      later(bus, "wait", slot, -number)
+    end
+  end
+  burst.parts = {}
+end
+
+--- A reply that is one of several frames. Returns, each nil where there is none: packet of its request; response time,
+-- or minus the packet of the burst's table; what it is shown with; the table.
+function M.feed(bus, slot, packet, raw, address, id, starts, ends)
+  local state = bus.state
+  local number = byte(raw, 5)
+  local burst = state.burst
+  local highest = IDS[id]
+  if number > highest then
+    return nil -- FF, or more than the paper's 48 cells, 21 sensors: skipped
+  end
+  local running = burst
+    and burst.id == id
+    and burst.address == address
+    and starts - burst.ended <= bus.times.burst + GRACE
+  if running and burst.base == 0 and number == highest and id >= 0x95 then
+    return nil -- with base 0 the highest number is one less
+  end
+  running = running and number >= burst.number and not (number == burst.number and burst.asked)
+  local missing, again, wait, from
+  if running then
+    again = number == burst.number or nil
+    from = burst.number + 1
+  else
+    M.finish(bus)
+    local request
+    request, wait = exchange.answer(bus, slot, packet, raw, address, id, starts)
+    local board = state.boards[address]
+    local per_frame = PER_FRAME[id]
+    burst = {
+      id = id,
+      address = address,
+      base = number == 0 and 0 or 1,
+      request = request,
+      count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil,
+      per_frame = per_frame,
+      values = per_frame and {} or nil, -- by cell or sensor
+      texts = not per_frame and {} or nil, -- by frame number
+      whole = true, -- every frame from the base on was seen
+      parts = {}, -- slots of its frames, until the table is there
+      table_in = nil,
+    }
+    state.burst = burst
+    from = burst.base
+  end
+  if number > from then
+    missing = {}
+    for i = from, number - 1 do
+      missing[#missing + 1] = i
+    end
+    burst.whole = false
+  end
+  burst.number, burst.ended, burst.asked, burst.last, burst.last_in = number, ends, nil, slot, packet
+  local list
+  if burst.values then
+    list = note_values(burst, raw, number)
+  else
+    burst.texts[number] = raw:sub(6, 12)
+  end
+  local memory = burst.count and shape_of(burst.base, burst.count) or burst
+  if missing or again or list then
+    memory = { burst = memory, missing = missing, again = again, table = list }
+  end
+  if burst.table_in then
+    wait = -burst.table_in
+  elseif list then
+    link_parts(bus, burst, packet)
+  elseif burst.count then
+    burst.parts[#burst.parts + 1] = slot
+  end
+  return burst.request, wait, memory, list
+end
+
+--- The packet in which the whole of a frame's burst stands, or nil; `again`: the capture was read to its end.
+function M.whole_in(results, slot, again)
+  local wait = results.wait[slot]
+  if wait and wait < 0 then
+    return -wait
+  end
+  local memory = results.memory[slot]
+  local burst = memory and memory.burst or memory
+  if not again or not burst then
+    return nil
+  end
+  if burst.last and not burst.count and burst.whole and burst.last ~= slot then
+    return burst.last_in
+  end
+  return results.whole_in[slot]
+end
+
+--- Whether a frame is the last of a burst that was cut off: it ended and its last cell or sensor was not reached.
+function M.is_cut_off(results, slot)
+  local odd = results.odd[slot]
+  if odd and odd.cut_off then
+    return true
+  end
+  for i = 1, #results.buses do
+    local bus = results.buses[i]
+    local burst = bus.state.burst
+    if burst and burst.last == slot then
+      return M.falls_short(burst) and bus.state.latest - burst.ended > bus.times.burst + GRACE or false
+    end
+  end
+  return false
+end
+
+return M

@@ -1,0 +1,189 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Who asked whom, and who answered: echo, retry, the request of a reply, and what did not go so well (docs/records.md
+-- 6, 7, 10). Pure Lua, no Wireshark. Times are seconds.
+--
+--   request ----- waits 1 s -----|---- late until 10 s ----|
+--           reply: response time        late reply           nobody's
+
+local results_module = require("daly_results")
+
+local M = {}
+
+local byte, sub = string.byte, string.sub
+local odd_of, later = results_module.odd, results_module.later
+
+--- Differences this small are the arithmetic's (docs/records.md 1).
+M.GRACE = 1e-6
+local GRACE = M.GRACE
+
+--- Whether a request with this ID writes: restart, the MOS switches, and write = read - 40 of the reads 50..6A.
+function M.is_write(id)
+  return id == 0x00 or id == 0xD9 or id == 0xDA or (id >= 0x10 and id <= 0x2A)
+end
+local is_write = M.is_write
+
+--- A bus's memory of requests.
+function M.state()
+  return {
+    last = {}, -- newest request by its bytes
+    remembered = 0,
+    asked = {}, -- by ID: requests in order, unanswered ones and some answered: [first .. last]
+    any = false, -- a request was seen
+    host = nil, -- who asked last, and when that ended
+    host_ended = nil,
+    latest = -math.huge, -- latest beginning of a frame
+  }
+end
+
+-- Forget requests that nobody can answer or repeat any more; only when there are many.
+local function forget_old(state, now, limit)
+  local kept, count = {}, 0
+  for key, request in pairs(state.last) do
+    if now - request.ended <= limit then
+      kept[key] = request
+      count = count + 1
+    end
+  end
+  state.last, state.remembered = kept, count
+end
+
+-- Put a request to those that can be answered, and let go of those that can't.
+local function remember(state, id, request, late)
+  local list = state.asked[id]
+  if not list then
+    list = { first = 1, last = 0 }
+    state.asked[id] = list
+  end
+  local first, last = list.first, list.last + 1
+  list[last] = request
+  while first < last and (list[first].answered or state.latest - list[first].ended > late + GRACE) do
+    list[first] = nil
+    first = first + 1
+  end
+  list.first, list.last = first, last
+end
+
+--- A request. Returns "echo", "retry" or nil.
+function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
+  local state, times = bus.state, bus.times
+  local flag
+  local before = state.last[raw]
+  if before and not before.answered and state.latest - before.ended <= times.reply + GRACE then
+    local echo
+    if side and before.side then
+      echo = side ~= before.side
+    else
+      echo = not before.echoed and starts - before.ended <= times.echo + GRACE
+    end
+    if echo then
+      before.echoed = true
+      return "echo"
+    end
+    flag = "retry"
+  end
+  local names = address >= 0x40 and address <= 0x4F
+  local request = {
+    slot = slot,
+    number = number,
+    ended = ends,
+    side = side,
+    board = names and address - 0x3F or nil, -- the board it names
+    others = address <= 0x40 or address > 0x4F, -- any board's reply will do
+    data = is_write(id) and sub(raw, 5, 12) or nil,
+  }
+  if not before then
+    state.remembered = state.remembered + 1
+    if state.remembered > 512 then
+      forget_old(state, state.latest, times.reply + 1)
+    end
+  end
+  state.last[raw] = request
+  remember(state, id, request, times.late)
+  local host = names and 0x40 or address
+  if state.host and state.host ~= host and starts - state.host_ended <= times.reply + GRACE then
+    odd_of(bus.results, slot).second_host = true
+  end
+  state.host, state.host_ended, state.any = host, ends, true
+  return flag
+end
+
+-- What the reply to a write says of it.
+local function write_result(id, raw, written)
+  if id == 0xD9 or id == 0xDA then
+    return byte(raw, 5) == byte(written) and "confirmed" or "denied"
+  elseif id == 0x21 then
+    return byte(raw, 5) == 1 and "confirmed" or "denied"
+  end
+  return id ~= 0x00 and sub(raw, 5, 12) == written and "confirmed" or "answered"
+end
+
+-- Nobody waits for this reply: say so, where somebody asks on this bus at all. `newest`: the newest request for its ID
+-- that still waits, `missed`: the newest that it comes too late for.
+local function unasked(bus, slot, number, address, newest, missed)
+  if not bus.state.any then
+    return
+  end
+  local odd = odd_of(bus.results, slot)
+  odd.unasked = true
+  if missed then
+    missed.late = number
+    odd.late_to = missed.number
+  end
+  if newest and newest.board and newest.board ~= address and address >= 0x01 and address <= 0x10 then
+    odd.other_board = newest.board
+  end
+end
+
+--- The request that a reply (the first of its burst) belongs to stops waiting. Returns its packet and the response
+-- time, each nil where there is none.
+function M.answer(bus, slot, number, raw, address, id, starts)
+  local state, times = bus.state, bus.times
+  local list = state.asked[id]
+  local newest, missed
+  for i = list and list.last or 0, list and list.first or 1, -1 do
+    local request = list[i]
+    if not request.answered then
+      local fits = request.others or request.board == address
+      local old = state.latest - request.ended
+      if old > times.reply + GRACE then
+        if fits and not missed and not request.late and starts - request.ended <= times.late + GRACE then
+          missed = request
+        end
+      elseif fits then
+        request.answered = true
+        if i == list.last then
+          list[i] = nil
+          list.last = i - 1
+        end
+        later(bus, "link", request.slot, number)
+        if request.board and request.board ~= address and address >= 0x01 and address <= 0x10 then
+          odd_of(bus.results, slot).other_board = request.board
+        end
+        if request.data then
+          odd_of(bus.results, slot).result = write_result(id, raw, request.data)
+        end
+        local wait = starts - request.ended
+        if wait < 0 then
+          wait = wait > -GRACE and 0.0 or nil
+        end
+        return request.number, wait
+      else
+        newest = newest or request
+      end
+    end
+  end
+  unasked(bus, slot, number, address, newest, missed)
+  return nil, nil
+end
+
+--- Whether a request got no reply while it waited, as far as is known by now.
+function M.is_unanswered(results, slot)
+  local bus = results.memory[slot]
+  return bus
+    and not results.link[slot]
+    and results.flag[slot] ~= "echo"
+    and bus.state.latest - results.wait[slot] > bus.times.reply + GRACE
+end
+
+return M
