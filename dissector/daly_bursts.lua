@@ -177,6 +177,15 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends)
   return burst.request, wait, memory, list
 end
 
+--- The characters of a text burst, without the padding at its end.
+function M.text(burst)
+  local parts = {}
+  for number = burst.base, burst.number do
+    parts[#parts + 1] = burst.texts[number]
+  end
+  return (table.concat(parts):match("^(.-)[%z\xFF\x20]*$"))
+end
+
 --- The packet in which the whole of a frame's burst stands, or nil; `again`: the capture was read to its end.
 function M.whole_in(results, slot, again)
   local wait = results.wait[slot]
@@ -188,8 +197,8 @@ function M.whole_in(results, slot, again)
   if not again or not burst then
     return nil
   end
-  if burst.last and not burst.count and burst.whole and burst.last ~= slot then
-    return burst.last_in
+  if burst.last and not burst.count and burst.whole then
+    return burst.last ~= slot and (burst.values or M.text(burst) ~= "") and burst.last_in or nil
   end
   return results.whole_in[slot]
 end
@@ -204,7 +213,7 @@ function M.is_cut_off(results, slot)
     local bus = results.buses[i]
     local burst = bus.state.burst
     if burst and burst.last == slot then
-      return M.falls_short(burst) and bus.state.latest - burst.ended > bus.times.burst + GRACE or false
+      return M.falls_short(burst) and results.latest - burst.ended > bus.times.burst + GRACE or false
     end
   end
   return false

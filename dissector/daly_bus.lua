@@ -10,6 +10,7 @@
 -- so that an ordinary frame costs no table.
 
 local exchange = require("daly_exchange")
+local results_module = require("daly_results")
 local bursts = require("daly_bursts")
 local boards = require("daly_board")
 
@@ -124,10 +125,8 @@ function M.rewind(bus, owner)
   end
   for i = 1, #mark.log do
     local fed = mark.log[i]
-    for name, column in pairs(results) do
-      if name ~= "buses" then
-        column[fed.slot] = nil
-      end
+    for _, column in ipairs(results_module.COLUMNS) do
+      results[column][fed.slot] = nil
     end
     if fed.owner ~= owner then
       others[#others + 1] = fed

@@ -23,6 +23,9 @@ function M.is_write(id)
 end
 local is_write = M.is_write
 
+-- So many unanswered requests for one ID are remembered, whatever a capture holds.
+local MOST_ASKED = 1024
+
 --- A bus's memory of requests.
 function M.state()
   return {
@@ -57,7 +60,10 @@ local function remember(state, id, request, late)
   end
   local first, last = list.first, list.last + 1
   list[last] = request
-  while first < last and (list[first].answered or state.latest - list[first].ended > late + GRACE) do
+  while
+    first < last
+    and (list[first].answered or state.latest - list[first].ended > late + GRACE or last - first >= MOST_ASKED)
+  do
     list[first] = nil
     first = first + 1
   end
@@ -183,7 +189,7 @@ function M.is_unanswered(results, slot)
   return bus
     and not results.link[slot]
     and results.flag[slot] ~= "echo"
-    and bus.state.latest - results.wait[slot] > bus.times.reply + GRACE
+    and results.latest - results.wait[slot] > bus.times.reply + GRACE
 end
 
 return M

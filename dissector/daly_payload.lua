@@ -177,16 +177,6 @@ local function printable(bytes)
   return (bytes:gsub("[^\x20-\x7E]", "?"))
 end
 
--- The text of a whole burst, nil when there is nothing in it.
-local function text_of(burst)
-  local parts = {}
-  for number = burst.base, burst.number do
-    parts[#parts + 1] = burst.texts[number]
-  end
-  local bytes = concat(parts):match("^(.-)[%z\xFF\x20]*$")
-  return bytes ~= "" and printable(bytes) or nil
-end
-
 --- What this frame carries of its whole burst: the list of all cells (mV) or sensors (raw), the text; nil, nil where
 -- another carries it, or none. `again`: the capture was read to its end.
 function M.whole(slot, memory, again)
@@ -201,7 +191,8 @@ function M.whole(slot, memory, again)
     if burst.values then
       return burst.values, nil
     end
-    return nil, text_of(burst)
+    local text = bursts.text(burst)
+    return nil, text ~= "" and printable(text) or nil
   end
   return nil, nil
 end

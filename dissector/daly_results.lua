@@ -26,8 +26,20 @@ local M = {}
 
 --- Columns for a capture.
 function M.new()
-  return { link = {}, wait = {}, memory = {}, flag = {}, whole_in = {}, odd = {}, buses = {} }
+  return {
+    link = {},
+    wait = {},
+    memory = {},
+    flag = {},
+    whole_in = {},
+    odd = {},
+    buses = {}, -- all of the capture
+    latest = -math.huge, -- when the latest packet of the capture began, s
+  }
 end
+
+--- The columns' names.
+M.COLUMNS = { "link", "wait", "memory", "flag", "whole_in", "odd" }
 
 --- The entry of a slot for rare things.
 function M.odd(results, slot)

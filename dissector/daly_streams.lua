@@ -286,6 +286,9 @@ end
 function M.first(capture, stream, number, time, raw)
   local length = #raw
   local cutter = stream.cutter
+  if time > capture.results.latest then
+    capture.results.latest = time
+  end
   if length == 0 then
     records.event(cutter)
     capture.plans[number] = { items = { { kind = "event", at = 0, length = 0 } } }

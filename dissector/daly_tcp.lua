@@ -67,6 +67,8 @@ end
 -- equals.
 local function feed(items, raw, pinfo)
   local number, bus, side = pinfo.number, nil, nil
+  local results = capture.results
+  results.latest = math.max(results.latest, pinfo.rel_ts)
   local seen = {}
   for i = 1, #items do
     local item = items[i]

@@ -32,6 +32,16 @@ def board(address: int) -> int:
     return 0
 
 
+def named_board(address: int) -> int:
+    """Return the board that a request to `address` names, 0 where it names none."""
+    return address - 0x3F if 0x40 <= address <= 0x4F else 0
+
+
+def host(address: int) -> int:
+    """Return who asks: 40..4F are one host (a PC asking boards), any other address is one of its own."""
+    return 0x40 if 0x40 <= address <= 0x4F else address
+
+
 def only_board(address: int) -> int:
     """Return the board whose reply alone answers a request to `address`, 0 where any board's does."""
     return board(address) if 0x41 <= address <= 0x4F else 0

@@ -3,7 +3,7 @@
 
     request 95   reply 1   reply 2   reply 3   reply 4   reply 5   request 96 ...
                 |<------------------ burst ----------------->|
-                                                table (14 cells known)
+                                                table (14 cells known), which the others link to
 
 Numbers begin at 0 by the vendor's paper, at 1 on every device seen (field notes, fact 1).
 """
@@ -13,12 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from dalyref import cells
+from dalyref import cells, texts
 
 if TYPE_CHECKING:
     from dalyref.values import Fields
 
-IDS = frozenset((cells.CELLS, cells.TEMPERATURES, 0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
+IDS = frozenset((cells.CELLS, cells.TEMPERATURES, *texts.FIELDS))
 INVALID = 0xFF
 """The frame number of a frame without content (paper, 95)."""
 
@@ -47,8 +47,16 @@ class Burst(Generic[T]):
     """The record of its last frame."""
     whole: bool
     """No number is missing so far."""
-    voltages: dict[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
-    """95 only: frame number to slots, mV."""
+    owner_number: int = 0
+    """Packet of its last frame."""
+    parts: list[T] = field(default_factory=list[T])
+    """Its records that are not linked to the whole yet, without those that carry it."""
+    whole_in: int = 0
+    """Packet of the record that carries the table or text, 0: none so far."""
+    values: dict[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
+    """Frame number to slots: of 95 in mV, of 96 as sent."""
+    text: dict[int, bytes] = field(default_factory=dict[int, bytes])
+    """Frame number to characters, of a text."""
 
     def continues(self, data_id: int, address: int, start_ns: int, longest_ns: int) -> bool:
         """Tell whether a reply is of the same kind and near enough to go on with this burst."""
@@ -56,13 +64,34 @@ class Burst(Generic[T]):
 
     @property
     def needs_end(self) -> bool:
-        """Tell whether the table is known only when the burst has ended."""
-        return self.data_id == cells.CELLS and self.whole and not self.count
+        """Tell whether what it carries as a whole is known only when it has ended."""
+        return self.whole and not self.count
+
+    @property
+    def cut_off(self) -> bool:
+        """Tell whether its last cell or sensor is known to be missing."""
+        per_frame = cells.SLOTS.get(self.data_id, 0)
+        return per_frame * (self.last - self.base + 1) < self.count
+
+    def reaches_end(self, number: int) -> bool:
+        """Tell whether frame `number` holds the last cell or sensor."""
+        per_frame = cells.SLOTS[self.data_id]
+        first = per_frame * (number - self.base) + 1
+        return first <= self.count < first + per_frame
+
+    def slots(self) -> list[int]:
+        """Return all cells or sensors that were seen, those that are known not to be one left out."""
+        seen = [slot for number in sorted(self.values) for slot in self.values[number]]
+        return seen[: self.count] if self.count else seen
 
     def table(self) -> Fields:
-        """Return the ``daly.cells.*`` fields of what was seen (all frames from the base on were)."""
-        voltages = [slot for number in sorted(self.voltages) for slot in self.voltages[number]]
-        return cells.table(voltages[: self.count] if self.count else voltages)
+        """Return the fields of the whole (all frames from the base on were seen)."""
+        if self.data_id == cells.CELLS:
+            return cells.table(self.slots())
+        if self.data_id == cells.TEMPERATURES:
+            return cells.sensor_table(self.slots())
+        text = texts.whole(self.text)
+        return {texts.FIELDS[self.data_id]: text} if text else {}
 
 
 def skipped(data_id: int, number: int, base: int) -> bool:

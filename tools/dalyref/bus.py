@@ -10,13 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dalyref import addresses, bursts, cells, faults, payload
+from dalyref import addresses, bursts, cells, payload, texts, writes
+from dalyref.board import Board, Seen
 from dalyref.bursts import Burst
 from dalyref.exchange import Exchange
 from dalyref.options import NANO, TOLERANCE_NS
 from dalyref.values import put
 
 if TYPE_CHECKING:
+    from dalyref.exchange import Request
     from dalyref.options import Options
     from dalyref.streams import Located
     from dalyref.values import Fields
@@ -30,16 +32,8 @@ class Slate:
     bus: Bus
     open_until_ns: int = 0
     """A record of this bus that begins later settles it; 0: settled."""
-
-
-@dataclass(slots=True, eq=False)
-class Board:
-    """What is known of the battery that answers with one address byte."""
-
-    cells: int = 0
-    sensors: int = 0
-    state: int | None = None
-    faults: int | None = None
+    asks: bool = False
+    """It is a request that nobody has answered."""
 
 
 class Bus:
@@ -48,6 +42,7 @@ class Bus:
     def __init__(self, options: Options) -> None:
         self.now_ns = 0
         """The latest beginning of a record."""
+        self._options = options
         self._reply_ns = options.limit_ns(options.reply)
         self._burst_ns = options.limit_ns(options.burst)
         self._exchange = Exchange[Slate](options)
@@ -65,28 +60,39 @@ class Bus:
             self._reply(located, data, slate)
         return slate
 
-    def settle(self, slate: Slate) -> None:
-        """Nothing more shall come to this record: its time is over."""
-        if self._burst is not None and self._burst.owner is slate:
-            self._end_burst()
+    def settle(self, slate: Slate, latest_ns: int) -> None:
+        """Nothing more shall come to this record: its time is over, or the capture.
+
+        latest_ns: when the latest packet of the capture began.
+        """
+        if slate.asks and latest_ns > slate.open_until_ns:
+            slate.fields["daly.unanswered"] = True
+        burst = self._burst
+        if burst is not None and burst.owner is slate:
+            self._end_burst(known=latest_ns > slate.open_until_ns)
         slate.open_until_ns = 0
 
     def _request(self, located: Located, data: bytes, slate: Slate) -> None:
         packet = located.packet
-        direction, retry = self._exchange.ask(
+        asked = self._exchange.ask(
             data, packet.number, located.start_ns, located.end_ns, side=packet.direction, owner=slate
         )
         fields = slate.fields
-        fields["daly.direction"] = direction
+        fields["daly.direction"] = asked.direction
         board = addresses.board(data[1])
         if board:
             fields["daly.board"] = board
-        if direction == addresses.ECHO:
+        if asked.direction == addresses.ECHO:
             return
-        if retry:
+        if asked.retry:
             fields["daly.retry"] = True
+        if asked.second_host:
+            fields["daly.second_host"] = True
+        if writes.is_write(data[2]):
+            fields["daly.write"] = True
         self._asked[data[2]] = self._asked.get(data[2], 0) + 1
         slate.open_until_ns = located.end_ns + self._reply_ns
+        slate.asks = True
 
     def _reply(self, located: Located, data: bytes, slate: Slate) -> None:
         fields = slate.fields
@@ -95,60 +101,49 @@ class Bus:
         if board:
             fields["daly.board"] = board
         if data[2] in bursts.IDS:
-            self._part(located, data, board, slate)
+            self._part(located, data, slate)
         else:
             self._end_burst()
-            self._answer(located, data[2], board, slate)
-            self._whole(data, fields)
+            self._answer(located, data, slate)
+            fields.update(payload.decode(data[2], data[4:12]))
+            self._board(data[1]).reply(_seen(located), data[2], data[4:12], fields)
 
-    def _answer(self, located: Located, data_id: int, board: int, slate: Slate) -> int:
+    def _answer(self, located: Located, data: bytes, slate: Slate) -> int:
         """Find the request of a reply; return its number, 0: none."""
-        request = self._exchange.answer(data_id, board)
-        if request is None:
+        fields = slate.fields
+        answer = self._exchange.answer(data[2], data[1], located.start_ns)
+        if answer.unasked:
+            fields["daly.unasked"] = True
+        if answer.late_to:
+            fields["daly.late_to"] = answer.late_to
+        if answer.other_board:
+            fields["daly.other_board"] = True
+        if answer.request is None:
             return 0
+        self._link(answer.request, located, data, slate)
+        return answer.request.number
+
+    @staticmethod
+    def _link(request: Request[Slate], located: Located, data: bytes, slate: Slate) -> None:
+        """Tell a request and its reply about each other."""
         fields = slate.fields
         fields["daly.request_in"] = request.number
         after_ns = located.start_ns - request.end_ns
         if after_ns >= -TOLERANCE_NS:  # else the time stamps can't tell
             fields["daly.response_time"] = max(after_ns, 0) / NANO
+        if request.written:
+            fields["daly.write_result"] = writes.result(data[2], request.written, data[4:12])
         request.owner.fields["daly.reply_in"] = located.packet.number
+        request.owner.asks = False
         request.owner.open_until_ns = 0
-        return request.number
-
-    def _whole(self, data: bytes, fields: Fields) -> None:
-        """Values of a reply that is one frame, and what is remembered of it."""
-        values = payload.decode(data[2], data[4:12])
-        if not values:
-            return
-        fields.update(values)
-        board = self._board(data[1])
-        match data[2]:
-            case 0x90:
-                if board.state is not None:
-                    fields["daly.pack.state"] = board.state
-            case 0x93:
-                board.state = data[4]
-            case 0x94:
-                if 1 <= data[4] <= cells.MOST_CELLS:
-                    board.cells = data[4]
-                if 1 <= data[5] <= cells.MOST_SENSORS:
-                    board.sensors = data[5]
-            case 0x98:
-                found = faults.bits(data[4:12])
-                if board.faults is not None:
-                    put(fields, "daly.fault_raised", faults.names(found & ~board.faults))
-                    put(fields, "daly.fault_cleared", faults.names(board.faults & ~found))
-                board.faults = found
-            case _:
-                pass
 
     def _board(self, address: int) -> Board:
         board = self._boards.get(address)
         if board is None:
-            board = self._boards[address] = Board()
+            board = self._boards[address] = Board(self._options)
         return board
 
-    def _part(self, located: Located, data: bytes, board: int, slate: Slate) -> None:
+    def _part(self, located: Located, data: bytes, slate: Slate) -> None:
         """Take a reply that is one frame of several."""
         fields, data_id, number = slate.fields, data[2], data[4]
         burst = self._burst
@@ -158,20 +153,20 @@ class Bus:
             fields["daly.frame_number"] = number
             if data_id in cells.SLOTS:
                 fields["daly.reserved"] = data[5:12].hex()
+            else:
+                fields["daly.text_part"] = texts.shown(data[5:12])
             return
         asked = self._asked.get(data_id, 0)
         if burst is not None and (number < burst.last or (number == burst.last and asked > burst.asked)):
             burst = None
         if burst is None:
             self._end_burst()
-            request = self._answer(located, data_id, board, slate)
+            request = self._answer(located, data, slate)
             burst = self._begin(data, request, slate)
             missing = range(burst.base, number)
         else:
             if burst.request:
                 fields["daly.request_in"] = burst.request
-            burst.owner.open_until_ns = 0
-            burst.owner = slate
             missing = range(burst.last + 1, number)
             if number == burst.last:
                 fields["daly.burst.repeat"] = True
@@ -179,34 +174,69 @@ class Bus:
             burst.whole = False
             put(fields, "daly.burst.missing", missing)
         burst.last, burst.end_ns, burst.asked = number, located.end_ns, asked
-        self._part_values(burst, data, fields)
-        if burst.needs_end:
+        burst.owner, burst.owner_number = slate, located.packet.number
+        self._part_values(burst, located, data, slate)
+        if burst.whole_in == 0:
+            # The whole, or that it was cut off, may still be found out.
             slate.open_until_ns = located.end_ns + self._burst_ns
 
     def _begin(self, data: bytes, request: int, slate: Slate) -> Burst[Slate]:
         address, data_id, number = data[1], data[2], data[4]
         board = self._board(address)
-        count = board.cells if data_id == cells.CELLS else board.sensors
+        count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
         base = 0 if number == 0 else 1
         self._burst = Burst(data_id, address, base, count, request, 0, number, 0, slate, whole=True)
         return self._burst
 
-    @staticmethod
-    def _part_values(burst: Burst[Slate], data: bytes, fields: Fields) -> None:
-        data_id, number, content = data[2], data[4], data[4:12]
+    def _part_values(self, burst: Burst[Slate], located: Located, data: bytes, slate: Slate) -> None:
+        data_id, number, content, fields = data[2], data[4], data[4:12], slate.fields
+        packet = located.packet.number
         if data_id not in cells.SLOTS:
             fields["daly.frame_number"] = number
-            return
-        real = cells.used(data_id, number, burst.base, burst.count)
-        fields.update(cells.decode(data_id, content, real))
-        if data_id == cells.CELLS:
-            burst.voltages[number] = cells.cells(content)
-            first = 3 * (number - burst.base) + 1
-            if burst.whole and first <= burst.count < first + 3:
-                fields.update(burst.table())
+            fields["daly.text_part"] = texts.shown(content[1:])
+            burst.text[number] = content[1:]
+        else:
+            real = cells.used(data_id, number, burst.base, burst.count)
+            fields.update(cells.decode(data_id, content, real))
+            burst.values[number] = cells.cells(content) if data_id == cells.CELLS else tuple(content[1:])
+        if burst.whole_in:
+            fields["daly.reassembled_in"] = burst.whole_in
+        if burst.count and burst.whole and burst.reaches_end(number):
+            fields.update(burst.table())
+            board = self._board(data[1])
+            if data_id == cells.CELLS:
+                board.cell_table(_seen(located), burst.slots(), fields)
+            else:
+                board.sensor_table(_seen(located), burst.slots(), fields)
+            self._link_parts(burst, packet)
+        elif burst.whole_in == 0:
+            burst.parts.append(slate)
 
-    def _end_burst(self) -> None:
+    @staticmethod
+    def _link_parts(burst: Burst[Slate], packet: int) -> None:
+        """Tell the records of a burst that came before where the whole of it stands."""
+        for part in burst.parts:
+            part.fields["daly.reassembled_in"] = packet
+            part.open_until_ns = 0
+        burst.parts.clear()
+        burst.whole_in = burst.whole_in or packet
+
+    def _end_burst(self, *, known: bool = True) -> None:
+        """End the running burst. known: it is sure that it has ended, the capture does not merely stop."""
         burst, self._burst = self._burst, None
-        if burst is not None and burst.needs_end:
-            burst.owner.fields.update(burst.table())
-            burst.owner.open_until_ns = 0
+        if burst is None:
+            return
+        if burst.needs_end:
+            whole = burst.table()
+            if whole:
+                burst.owner.fields.update(whole)
+                burst.parts.remove(burst.owner)
+                self._link_parts(burst, burst.owner_number)
+        if known and burst.cut_off:
+            burst.owner.fields["daly.burst.cut_off"] = True
+        for part in (*burst.parts, burst.owner):
+            part.open_until_ns = 0
+
+
+def _seen(located: Located) -> Seen:
+    return Seen(located.packet.number, located.start_ns, located.end_ns)

@@ -63,14 +63,41 @@ def decode(data_id: int, data: bytes, real: int) -> Fields:
     return fields
 
 
+CELL_FIELDS = tuple(f"daly.cell.{number:02d}" for number in range(1, MOST_CELLS + 1))
+"""One field a cell, cell 1 first."""
+
+
 def table(voltages: Sequence[int]) -> Fields:
-    """Return the ``daly.cells.*`` fields of all cells' voltages (mV, in order)."""
+    """Return the ``daly.cells.*`` fields of all cells' voltages (mV, in order), and each cell by its number."""
     low, high = min(voltages), max(voltages)
-    fields: Fields = {}
+    fields: Fields = dict(zip(CELL_FIELDS, voltages, strict=False))
     put(fields, "daly.cells.voltage", voltages)
     fields["daly.cells.count"] = len(voltages)
     fields["daly.cells.min"] = low
+    fields["daly.cells.min_number"] = voltages.index(low) + 1
     fields["daly.cells.max"] = high
+    fields["daly.cells.max_number"] = voltages.index(high) + 1
     fields["daly.cells.average"] = sum(voltages) / len(voltages)
     fields["daly.cells.spread"] = high - low
+    return fields
+
+
+def is_there(raw: int) -> bool:
+    """Tell a sensor's byte from those that stand for no sensor (field notes, a.1, 92)."""
+    return raw not in (0x00, 0xFF)
+
+
+def sensor_table(raw: Sequence[int]) -> Fields:
+    """Return the ``daly.sensors.*`` fields of all sensors' bytes (C + 40, in order)."""
+    fields: Fields = {"daly.sensors.count": len(raw)}
+    put(fields, "daly.sensors.temperature", [byte - 40 for byte in raw])
+    there = [byte for byte in raw if is_there(byte)]
+    if there:
+        low, high = min(there), max(there)
+        fields["daly.sensors.min"] = low - 40
+        fields["daly.sensors.min_number"] = raw.index(low) + 1
+        fields["daly.sensors.max"] = high - 40
+        fields["daly.sensors.max_number"] = raw.index(high) + 1
+        fields["daly.sensors.average"] = sum(there) / len(there) - 40
+        fields["daly.sensors.spread"] = high - low
     return fields

@@ -72,6 +72,7 @@ class Decoder:
         self._place = 0
         self._held: deque[tuple[Decoded, Slate | None]] = deque()
         self._now_ns = 0
+        self._latest_ns = 0  # beginning of the latest packet
 
     def feed(self, packet: Packet) -> list[Decoded]:
         """Take the next packet of the file; return the records that are final, in the order of the file.
@@ -80,6 +81,7 @@ class Decoder:
         """
         if packet.link_type not in SERIAL_LINK_TYPES:
             return []
+        self._latest_ns = max(self._latest_ns, packet.time_ns)
         key = (packet.interface, packet.direction)
         stream = self._streams.get(key)
         if stream is None:
@@ -192,7 +194,7 @@ class Decoder:
                     or len(held) > _MOST_HELD
                 ):
                     break
-                slate.bus.settle(slate)
+                slate.bus.settle(slate, self._latest_ns)
             out.append(decoded)
             held.popleft()
         return out

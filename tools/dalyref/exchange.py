@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Requests and the replies that belong to them, on one bus (docs/records.md, sections 6 and 7).
 
-request --+---------------- waits 1 s ----------------|        answered: waits no more
+request --+---------------- waits 1 s ----------------|--- until 10 s: late ---|    answered: waits no more
           |<100 ms>| the same again: echo (once)
                    | the same again: retry -- waits in its own right
 
@@ -13,13 +13,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from dalyref import addresses
+from dalyref import addresses, writes
 
 if TYPE_CHECKING:
     from dalyref.options import Options
     from dalyref.packet import Direction
 
-_MOST_WAITING = 256
+_MOST_ASKED = 1024
 """Unanswered requests remembered for one data ID: a hostile capture shall not fill the memory."""
 _MOST_DIFFERENT = 4096
 
@@ -36,10 +36,36 @@ class Request(Generic[T]):
     side: Direction
     only: int
     """The one board whose reply it takes, 0: any board's."""
+    board: int
+    """The board it names, 0: none."""
+    written: bytes
+    """Its eight data bytes, of one that writes; else nothing."""
     owner: T
     """What the caller wants to know when the answer comes."""
     answered: bool = False
+    answered_late: bool = False
     echoed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a frame from a host is."""
+
+    direction: int
+    """``addresses.REQUEST`` or ``ECHO``."""
+    retry: bool = False
+    second_host: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Answer(Generic[T]):
+    """What a reply belongs to."""
+
+    request: Request[T] | None
+    late_to: int = 0
+    """Packet of the request that it comes too late for, 0: none."""
+    unasked: bool = False
+    other_board: bool = False
 
 
 class Exchange(Generic[T]):
@@ -48,8 +74,10 @@ class Exchange(Generic[T]):
     def __init__(self, options: Options) -> None:
         self._wait_ns = options.limit_ns(options.reply)
         self._echo_ns = options.limit_ns(options.echo)
+        self._late_ns = options.limit_ns(options.late)
         self._newest: dict[bytes, Request[T]] = {}
-        self._waiting: dict[int, list[Request[T]]] = {}
+        self._asked: dict[int, list[Request[T]]] = {}  # by data ID, unanswered, oldest first
+        self._host: tuple[int, int] | None = None  # who asked last, and when that ended (ns)
         self._latest_ns = 0
 
     def pass_time(self, start_ns: int) -> None:
@@ -59,10 +87,8 @@ class Exchange(Generic[T]):
     def _waits(self, request: Request[T]) -> bool:
         return self._latest_ns - request.end_ns <= self._wait_ns
 
-    def ask(
-        self, frame: bytes, number: int, start_ns: int, end_ns: int, *, side: Direction, owner: T
-    ) -> tuple[int, bool]:
-        """Take a frame from a host: return (``addresses.REQUEST`` or ``ECHO``, whether it is a retry)."""
+    def ask(self, frame: bytes, number: int, start_ns: int, end_ns: int, *, side: Direction, owner: T) -> Asked:
+        """Take a frame from a host."""
         before = self._newest.pop(frame, None)
         retry = False
         if before is not None and not before.answered and self._waits(before):
@@ -73,27 +99,46 @@ class Exchange(Generic[T]):
             if echo:
                 before.echoed = True
                 self._newest[frame] = before
-                return addresses.ECHO, False
+                return Asked(addresses.ECHO)
             retry = True
-        request = Request(number, end_ns, side, addresses.only_board(frame[1]), owner)
+        address, data_id = frame[1], frame[2]
+        written = frame[4:12] if writes.is_write(data_id) else b""
+        request = Request(
+            number, end_ns, side, addresses.only_board(address), addresses.named_board(address), written, owner
+        )
         self._newest[frame] = request
         if len(self._newest) > _MOST_DIFFERENT:
             del self._newest[next(iter(self._newest))]
-        waiting = self._waiting.setdefault(frame[2], [])
-        waiting.append(request)
-        if len(waiting) > _MOST_WAITING:
-            del waiting[0]
-        return addresses.REQUEST, retry
+        asked = self._asked.setdefault(data_id, [])
+        while asked and (len(asked) >= _MOST_ASKED or self._latest_ns - asked[0].end_ns > self._late_ns):
+            del asked[0]
+        asked.append(request)
+        host, last = addresses.host(address), self._host
+        self._host = (host, end_ns)
+        second = last is not None and last[0] != host and start_ns - last[1] <= self._wait_ns
+        return Asked(addresses.REQUEST, retry, second)
 
-    def answer(self, data_id: int, board: int) -> Request[T] | None:
-        """Take a reply: return the request it belongs to, which then waits no more."""
-        waiting = self._waiting.get(data_id)
-        if not waiting:
-            return None
-        for index in range(len(waiting) - 1, -1, -1):
-            request = waiting[index]
+    def answer(self, data_id: int, address: int, start_ns: int) -> Answer[T]:
+        """Take a reply (the first of its burst): find the request it belongs to, which then waits no more."""
+        board = addresses.board(address)
+        asked = self._asked.get(data_id, [])
+        for index in range(len(asked) - 1, -1, -1):
+            request = asked[index]
             if self._waits(request) and request.only in (0, board):
                 request.answered = True
-                del waiting[index]
-                return request
-        return None
+                del asked[index]
+                return Answer(request, other_board=bool(board and request.board not in (0, board)))
+        if self._host is None:
+            return Answer(None)
+        waiting = next((request for request in reversed(asked) if self._waits(request)), None)
+        other = waiting is not None and board != 0 and waiting.board not in (0, board)
+        for request in reversed(asked):
+            if (
+                request.only in (0, board)
+                and not request.answered_late
+                and not self._waits(request)
+                and start_ns - request.end_ns <= self._late_ns
+            ):
+                request.answered_late = True
+                return Answer(None, request.number, unasked=True, other_board=other)
+        return Answer(None, unasked=True, other_board=other)

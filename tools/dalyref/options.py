@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The constants of the reading, all of them times on the wire."""
+"""The constants of the reading (docs/records.md): times on the wire, and tolerances."""
 
 from __future__ import annotations
 
@@ -25,6 +25,16 @@ class Options:
     """A request waits so long for its reply."""
     burst: float = 0.500
     """A burst ends after so long a silence."""
+    late: float = 10.0
+    """A reply that its request waited for no longer, but that starts within this, is late."""
+    age: float = 10.0
+    """Records further apart than this do not contradict each other."""
+    cell_tolerance: float = 20
+    """91 against the cells of 95, mV."""
+    temperature_tolerance: float = 2
+    """92 against the sensors of 96, C."""
+    sum_tolerance: float = 1
+    """Pack voltage against the sum of the cells, %."""
 
     def characters_ns(self, count: int) -> int:
         """Return how long `count` characters take on the wire, in ns."""

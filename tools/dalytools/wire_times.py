@@ -8,6 +8,13 @@ import math
 
 from dalyref.options import Options
 
+_TIMES = ("quiet", "echo", "reply", "burst", "late", "age")
+_TOLERANCES = (
+    ("cell_tolerance", "mV", "0x91 and the cells of 0x95 may differ by so much"),
+    ("temperature_tolerance", "C", "0x92 and the sensors of 0x96 may differ by so much"),
+    ("sum_tolerance", "%%", "the pack voltage and the sum of the cells may differ by so much"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") -> None:
     """Declare one option a constant; ``read`` gives them. quiet: another name, where --quiet means something else."""
@@ -18,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") ->
         ("echo", "--echo", "a request repeated within this is an echo"),
         ("reply", "--reply", "a request waits so long for its reply"),
         ("burst", "--burst", "an answer in several frames ends after so long a silence"),
+        ("late", "--late", "a reply later than its request waits, but within this, is late"),
+        ("age", "--age", "records further apart do not contradict each other"),
     ):
         default: float = getattr(defaults, name)
         parser.add_argument(
@@ -28,19 +37,38 @@ def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") ->
             metavar="S",
             help=f"{text} (seconds, default {default:g})",
         )
+    for name, unit, text in _TOLERANCES:
+        tolerance: float = getattr(defaults, name)
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=_whole,
+            default=round(tolerance),
+            metavar="N",
+            help=f"{text} ({unit}, default {tolerance:g})",
+        )
 
 
 def read(args: argparse.Namespace) -> Options:
     """Return the constants that the command line asks for."""
-    return Options(args.baud, args.quiet_s, args.echo_s, args.reply_s, args.burst_s)
+    times = {name: getattr(args, f"{name}_s") for name in _TIMES}
+    tolerances = {name: getattr(args, name) for name, _, _ in _TOLERANCES}
+    return Options(args.baud, **times, **tolerances)
 
 
 def preferences(options: Options) -> list[str]:
     """Return the words that tell tshark's dissector the same (its times are whole milliseconds)."""
     words = ["-o", f"daly.baud:{options.baud}"]
-    for name in ("quiet", "echo", "reply", "burst"):
+    for name in _TIMES:
         words += ["-o", f"daly.{name}:{round(getattr(options, name) * 1000)}"]
+    for name, _, _ in _TOLERANCES:
+        words += ["-o", f"daly.{name}:{round(getattr(options, name))}"]
     return words
+
+
+def _whole(text: str) -> int:
+    if not text.isascii() or not text.isdecimal() or len(text) > 6:
+        raise argparse.ArgumentTypeError(f"{text!r} is no tolerance; 20 is one")
+    return int(text)
 
 
 def _baud(text: str) -> int:
