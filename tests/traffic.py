@@ -20,7 +20,7 @@ CHARACTER_NS = 10 * 1_000_000_000 // 9600
 EPOCH_NS = 1_700_000_000_000_000_000
 
 ADDRESSES = (0x40, 0x40, 0x40, 0x41, 0x4F, 0x80, 0x20, 0x50, 0xFF, 0x01, 0x01, 0x01, 0x02, 0x03, 0x10, 0x11, 0x00)
-IDS = (*range(0x90, 0x99), 0x95, 0x95, 0x95, 0x96, 0x96, 0x94, 0x98, 0x57, 0x62, 0xD8, 0xD9, 0x21, 0xA5, 0x08)
+IDS = (*range(0x90, 0x99), 0x95, 0x95, 0x95, 0x96, 0x96, 0x94, 0x98, 0x57, 0x62, 0xD8, 0xD9, 0x21, 0x00, 0xA5, 0x08)
 BYTES = (
     0xA5,
     0xA5,
@@ -44,6 +44,7 @@ BYTES = (
 )
 # Milliseconds of quiet between items: a rule of docs/records.md lies near most of them.
 QUIET_MS = (0, 0, 0, 1, 5, 14, 37, 37, 37, 60, 98, 102, 140, 230, 248, 252, 300, 490, 515, 700, 960, 1010, 1300)
+RARELY_MS = (4000, 9900, 9990, 10010)
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,70 @@ class Traffic:
             frames.append(a5(address, data_id, bytes((number & 0xFF,)) + cells + bytes((r.choice(BYTES),))))
         return frames
 
+    def _texts(self) -> list[bytes]:
+        r = self.r
+        data_id = r.choice((0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
+        letters = r.choice((b"DL-BMS-R32-01E", b"A b\xe9\x00c\x00\xff   ", b"\x00\xff\x20", r.randbytes(20), b"z" * 35))
+        first = r.choice((1, 1, 1, 0))
+        frames = [
+            a5(1, data_id, bytes((first + at // 7,)) + letters[at : at + 7].ljust(7, b"\0"))
+            for at in range(0, len(letters), 7)
+        ]
+        if r.random() < 0.2:
+            del frames[r.randrange(len(frames))]
+        return frames
+
+    def _pack(self) -> list[bytes]:
+        """A board that tells the same story twice, give or take what the tolerances allow, and a little more."""
+        r = self.r
+        board, count, sensors = r.choice((1, 1, 2)), r.choice((4, 8, 16)), r.choice((1, 2, 8))
+        cells = [r.choice((3300, 3310, 3330, 0 if r.random() < 0.05 else 3300)) for _ in range(count)]
+        heat = [r.choice((0, 0xFF, 60, 61, 62, 63, 64)) for _ in range(sensors)]
+
+        def near(value: int, *steps: int) -> int:
+            return max(0, value + r.choice((0, 0, *steps, *(-step for step in steps))))
+
+        high, low = near(max(cells), 19, 20, 21), near(min(cells), 19, 20, 21)
+        total = near(sum(cells), sum(cells) // 100, sum(cells) // 100 + 100, 400) // 100
+        numbers = r.choice((1, count, count + 1)), r.choice((1, count, count + 1))
+        extremes = high.to_bytes(2, "big") + bytes((numbers[0],)) + low.to_bytes(2, "big") + bytes((numbers[1], 0, 0))
+        warm, cold = near(max(heat), 2, 3) & 0xFF, near(min(heat), 2, 3) & 0xFF
+        parts = [
+            [a5(board, 0x94, bytes((count, sensors, r.choice((0, 1)), 0, 0, 0, 9, 0)))],
+            [a5(board, 0x90, total.to_bytes(2, "big") + bytes((0, 0, 0x75, 0x30, 2, 0)))],
+            [a5(board, 0x91, extremes)],
+            [a5(board, 0x92, bytes((warm, r.choice((1, sensors + 1)), cold, 1)) + bytes(4))],
+            [a5(board, 0x93, bytes((r.choice((0, 1, 2)), r.choice((0, 1)), r.choice((0, 1, 2)), 1, 0, 0, 1, 0)))],
+            [
+                a5(
+                    board,
+                    0x95,
+                    bytes((n + 1,)) + b"".join((cells + [3333] * 3)[i].to_bytes(2, "big") for i in group) + b"2",
+                )
+                for n, group in enumerate(range(k, k + 3) for k in range(0, count, 3))
+            ][: r.choice((None, None, None, -1))],
+            [
+                a5(board, 0x96, bytes((n + 1, *heat[7 * n : 7 * n + 7])).ljust(8, b"\0"))
+                for n in range((sensors + 6) // 7)
+            ],
+            [a5(board, 0x98, bytes((r.choice((0, 1, 2, 3)), 0, 0, 0, 0, 0, r.choice((0, 0x10, 0x80)), 0)))],
+        ]
+        r.shuffle(parts)
+        return [
+            frame
+            for part in parts[: r.choice((2, 4, 8, 8))]
+            for frame in ([a5(0x3F + board, part[0][2], bytes(8))] if r.random() < 0.6 else []) + part
+        ]
+
+    def _write(self) -> list[bytes]:
+        r = self.r
+        data_id = r.choice((0xD9, 0xDA, 0x21, 0x00, 0x10, 0x19, 0x1F, 0x2A, 0x2B, 0x0F))
+        data = bytes((r.choice((0, 1, 2)),)) + r.choice((bytes(7), r.randbytes(7)))
+        answer = r.choice((data, data, bytes((1 - data[0] % 2,)) + data[1:], bytes((data[0],)) + bytes(7)))
+        asked = a5(r.choice((0x40, 0x80, 0x41)), data_id, data)
+        replies = [a5(r.choice((1, 1, 2)), data_id, answer)] * r.choice((0, 1, 1, 1, 2))
+        return [asked] * r.choice((1, 1, 2)) + replies
+
     def _modbus(self) -> bytes:
         r = self.r
         board = r.choice((1, 1, 2, 16))
@@ -203,8 +268,10 @@ class Traffic:
             return self._request()
         if style < 0.5:
             return self._frame()
-        if style < 0.68:
+        if style < 0.6:
             return b"".join(self._burst())
+        if style < 0.68:
+            return b"".join(r.choice((self._texts, self._pack, self._pack, self._write))())
         if style < 0.78:
             return self._modbus()
         if style < 0.86:
@@ -221,7 +288,7 @@ class Traffic:
             data = self._item()
             if data and r.random() < 0.12:
                 data = self._damaged(data)
-            now += r.choice(QUIET_MS) * 1_000_000 + r.randrange(900_000)
+            now += r.choice(RARELY_MS if r.random() < 0.02 else QUIET_MS) * 1_000_000 + r.randrange(900_000)
             interface = r.choice((0, 0, 0, 0, 1, 2, 3))
             direction = r.choice((1, 2)) if interface == 1 else 0
             if r.random() < 0.01:

@@ -12,6 +12,8 @@ from dalycapture.interface import Interface
 from dalytools.field_names import FIELD_NAMES, VIEW_NAMES
 from dalytools.tshark import Tshark, lua_complaint
 
+BETWEEN = "\x1f"  # several values of a field: a text of the bus can hold any character but this kind
+
 EXPERT = "_ws.expert.message"
 LUA_ERROR = "_ws.lua.error"
 INFO = "_ws.col.Info"
@@ -86,7 +88,7 @@ def dissect_with(tshark: Tshark) -> Dissect:
         words = ["-2"] if two_pass else []
         words += ["-Y", "frame"] if two_pass and tree else []
         words += [word for option in options for word in ("-o", option)]
-        words += ["-r", str(path), "-T", "fields", "-E", "separator=/t", "-E", "aggregator=;"]
+        words += ["-r", str(path), "-T", "fields", "-E", "separator=/t", "-E", f"aggregator={BETWEEN}"]
         words += [word for name in names for word in ("-e", name)]
         done = tshark.run(*words)
         messages = done.stderr.decode()
@@ -97,7 +99,7 @@ def dissect_with(tshark: Tshark) -> Dissect:
             values = line.split("\t")
             rows.append(
                 {
-                    name: [value] if name in (INFO, EXPERT) else value.split(";")
+                    name: [value] if name in (INFO, EXPERT) else value.split(BETWEEN)
                     for name, value in zip(names, values, strict=True)
                     if value
                 }

@@ -33,7 +33,7 @@ def test_the_record_with_the_last_cell_has_the_table_in_one_pass(dissect: Dissec
         5, 3301, 3305, 3303.0, 4,
     ]  # fmt: skip
     assert rows[2]["daly.reserved"] == [f"{3333:04x}32"]  # the stale slot is no cell
-    assert "all 5: min 3301  max 3305  average 3303  spread 4 mV" in info(rows[2])
+    assert "all 5: min 3301 (cell 1)  max 3305 (cell 5)  average 3303  spread 4 mV" in info(rows[2])
 
 
 def test_without_a_count_the_last_record_has_it_in_the_second_pass(dissect: Dissect) -> None:

@@ -47,6 +47,8 @@ class Burst(Generic[T]):
     """The record of its last frame."""
     whole: bool
     """No number is missing so far."""
+    open_until_ns: int = 0
+    """It ends when a record begins later."""
     owner_number: int = 0
     """Packet of its last frame."""
     parts: list[T] = field(default_factory=list[T])

@@ -34,6 +34,17 @@ class Slate:
     """A record of this bus that begins later settles it; 0: settled."""
     asks: bool = False
     """It is a request that nobody has answered."""
+    burst: Burst[Slate] | None = None
+    """The burst it is a part of, while that may still say something of it."""
+
+    def waits_until(self) -> int:
+        """Return when it is settled by time, ns; 0: it is settled."""
+        return self.burst.open_until_ns if self.burst is not None else self.open_until_ns
+
+    def close(self) -> None:
+        """Nothing more comes to it."""
+        self.open_until_ns = 0
+        self.burst = None
 
 
 class Bus:
@@ -65,12 +76,12 @@ class Bus:
 
         latest_ns: when the latest packet of the capture began.
         """
-        if slate.asks and latest_ns > slate.open_until_ns:
+        known = latest_ns > slate.waits_until()
+        if slate.asks and known:
             slate.fields["daly.unanswered"] = True
-        burst = self._burst
-        if burst is not None and burst.owner is slate:
-            self._end_burst(known=latest_ns > slate.open_until_ns)
-        slate.open_until_ns = 0
+        if slate.burst is not None and slate.burst is self._burst:
+            self._end_burst(known=known)
+        slate.close()
 
     def _request(self, located: Located, data: bytes, slate: Slate) -> None:
         packet = located.packet
@@ -135,7 +146,7 @@ class Bus:
             fields["daly.write_result"] = writes.result(data[2], request.written, data[4:12])
         request.owner.fields["daly.reply_in"] = located.packet.number
         request.owner.asks = False
-        request.owner.open_until_ns = 0
+        request.owner.close()
 
     def _board(self, address: int) -> Board:
         board = self._boards.get(address)
@@ -175,10 +186,10 @@ class Bus:
             put(fields, "daly.burst.missing", missing)
         burst.last, burst.end_ns, burst.asked = number, located.end_ns, asked
         burst.owner, burst.owner_number = slate, located.packet.number
+        burst.open_until_ns = located.end_ns + self._burst_ns
         self._part_values(burst, located, data, slate)
         if burst.whole_in == 0:
-            # The whole, or that it was cut off, may still be found out.
-            slate.open_until_ns = located.end_ns + self._burst_ns
+            slate.burst = burst  # the whole, or that it was cut off, may still be found out
 
     def _begin(self, data: bytes, request: int, slate: Slate) -> Burst[Slate]:
         address, data_id, number = data[1], data[2], data[4]
@@ -217,7 +228,7 @@ class Bus:
         """Tell the records of a burst that came before where the whole of it stands."""
         for part in burst.parts:
             part.fields["daly.reassembled_in"] = packet
-            part.open_until_ns = 0
+            part.close()
         burst.parts.clear()
         burst.whole_in = burst.whole_in or packet
 
@@ -235,7 +246,7 @@ class Bus:
         if known and burst.cut_off:
             burst.owner.fields["daly.burst.cut_off"] = True
         for part in (*burst.parts, burst.owner):
-            part.open_until_ns = 0
+            part.close()
 
 
 def _seen(located: Located) -> Seen:

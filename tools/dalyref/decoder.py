@@ -185,8 +185,7 @@ class Decoder:
         held = self._held
         while held:
             decoded, slate = held[0]
-            if slate is not None and slate.open_until_ns:
-                late_ns = slate.open_until_ns
+            if slate is not None and (late_ns := slate.waits_until()):
                 if not (
                     everything
                     or slate.bus.now_ns > late_ns + _LATE_ON_BUS_NS

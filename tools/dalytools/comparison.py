@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from dalyref.packet import Packet
 
-_BETWEEN_FIELDS, _BETWEEN_VALUES = "\t", ";"
+_BETWEEN_FIELDS, _BETWEEN_VALUES = "\t", "\x1f"
 _REST_KINDS = ("junk", "short")
 _UNDECODED = FIELD_NAMES.index("daly.undecoded")
 _KIND = FIELD_NAMES.index("daly.kind")

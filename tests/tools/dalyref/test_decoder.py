@@ -191,7 +191,13 @@ def test_fields_do_not_depend_on_the_packets(parts: list[bytes], sizes: list[int
         out: list[tuple[object, ...]] = []
         for record in decode(packets):
             fields = dict(record.fields)
-            for name in ("daly.request_in", "daly.reply_in", "daly.reassembled_in", "daly.late_to", "daly.changed_from"):
+            for name in (
+                "daly.request_in",
+                "daly.reply_in",
+                "daly.reassembled_in",
+                "daly.late_to",
+                "daly.changed_from",
+            ):
                 if name in fields:
                     fields[name] = True
             after = fields.pop("daly.response_time", None)
