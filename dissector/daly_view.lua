@@ -15,6 +15,7 @@ local byte, format, concat = string.byte, string.format, table.concat
 
 -- Called by its name, a method of Wireshark's objects is looked up in C every time: a fifth of a packet's cost.
 local add, add_le, referenced = TreeItem.add, TreeItem.add_le, TreeItem.referenced
+local append_text, set_text, set_generated = TreeItem.append_text, TreeItem.set_text, TreeItem.set_generated
 local range = Tvb.range
 
 local packet_comment = Field.new("frame.comment")
@@ -55,7 +56,7 @@ function out.bytes(field, first, length, unit)
   if visible or referenced(tree, field) then
     local item = add(tree, field, range(tvb, at + 4 + first, length))
     if visible and unit then
-      item:append_text(unit)
+      append_text(item, unit)
     end
   end
 end
@@ -64,7 +65,7 @@ function out.value(field, first, length, value, unit)
   if visible or referenced(tree, field) then
     local item = add(tree, field, range(tvb, at + 4 + first, length), value)
     if visible and unit then
-      item:append_text(unit)
+      append_text(item, unit)
     end
   end
 end
@@ -80,7 +81,7 @@ function out.cell(field, first, length, number, value)
   if visible or referenced(tree, field) then
     local item = add(tree, field, range(tvb, at + 4 + first, length))
     if visible then
-      item:set_text(format("Cell %d: %d mV", number, value))
+      set_text(item, format("Cell %d: %d mV", number, value))
     end
   end
 end
@@ -88,7 +89,7 @@ end
 -- One cell of the table, as one of all and by its own field.
 function out.made_cell(field, own, value, lowest, highest)
   if visible or referenced(tree, field) then
-    local item = add(tree, field, value):set_generated()
+    local item = set_generated(add(tree, field, value))
     if visible then
       item:set_hidden() -- its own field shows it
     end
@@ -96,16 +97,16 @@ function out.made_cell(field, own, value, lowest, highest)
   if visible or referenced(tree, own) then
     local item = add(tree, own, value):set_generated()
     if visible then
-      item:append_text(lowest and highest and " mV" or lowest and " mV, lowest" or highest and " mV, highest" or " mV")
+      append_text(item, lowest and highest and " mV" or lowest and " mV, lowest" or highest and " mV, highest" or " mV")
     end
   end
 end
 
 function out.made(field, value, unit)
   if visible or referenced(tree, field) then
-    local item = add(tree, field, value):set_generated()
+    local item = set_generated(add(tree, field, value))
     if visible and unit then
-      item:append_text(unit)
+      append_text(item, unit)
     end
   end
 end
