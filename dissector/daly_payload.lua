@@ -28,12 +28,30 @@ local function state_name(state)
   return data_ids.STATE[state] or format("state %d", state)
 end
 
-local function on(value)
-  return value ~= 0 and "on" or "off"
+-- Numbers as text, made once: formatting all of a packet's took a fifth of the time of a packet list. At most 65536.
+local whole_text, tenth_text = {}, {}
+
+local function whole(value)
+  local text = whole_text[value]
+  if not text then
+    text = format("%d", value)
+    whole_text[value] = text
+  end
+  return text
 end
 
-local function signed_tenths(value)
-  return format("%.1f", value)
+-- A raw number of two bytes, in tenths.
+local function tenths(raw)
+  local text = tenth_text[raw]
+  if not text then
+    text = format("%.1f", raw / 10)
+    tenth_text[raw] = text
+  end
+  return text
+end
+
+local function on(value)
+  return value ~= 0 and "on" or "off"
 end
 
 -- The burst that a 0x95, 0x96 or text frame belongs to, and what was odd about the frame.
@@ -60,14 +78,15 @@ end
 
 words[0x90] = function(frame)
   local _, _, _, _, a, b, _, _, e, f, g, h = byte(frame.raw, 1, 12)
-  local state = frame.memory and format(" (%s)", state_name(frame.memory)) or ""
-  return format(
-    "%.1f V  %s A%s  SOC %.1f %%",
-    (a * 256 + b) / 10,
-    signed_tenths((e * 256 + f - 30000) / 10),
-    state,
-    (g * 256 + h) / 10
-  )
+  local state = frame.memory and " (" .. state_name(frame.memory) .. ")" or ""
+  return tenths(a * 256 + b)
+    .. " V  "
+    .. tenths(e * 256 + f - 30000)
+    .. " A"
+    .. state
+    .. "  SOC "
+    .. tenths(g * 256 + h)
+    .. " %"
 end
 
 -- 0x91: max.2 number.1 min.2 number.1 reserved.2
@@ -81,7 +100,15 @@ end
 
 words[0x91] = function(frame)
   local _, _, _, _, a, b, c, d, e, f = byte(frame.raw, 1, 10)
-  return format("max %d mV (cell %d)  min %d mV (cell %d)", a * 256 + b, c, d * 256 + e, f)
+  return "max "
+    .. whole(a * 256 + b)
+    .. " mV (cell "
+    .. whole(c)
+    .. ")  min "
+    .. whole(d * 256 + e)
+    .. " mV (cell "
+    .. whole(f)
+    .. ")"
 end
 
 -- 0x92: max.1 number.1 min.1 number.1 reserved.4
@@ -253,30 +280,32 @@ words[0x95] = function(frame)
     return format("frame %d", n)
   end
   local real, before = real_slots(burst, frame, 3)
-  local list = { format("frame %d", n) }
-  local values = { a * 256 + b, c * 256 + d, e * 256 + f }
-  if real > 0 then
-    list[2] = real == 1 and format(" cell %d:", before + 1) or format(" cells %d-%d:", before + 1, before + real)
-    for i = 1, real do
-      list[#list + 1] = format("%d", values[i])
-    end
-    list[#list + 1] = "mV"
+  local text = "frame " .. whole(n)
+  if real == 3 then
+    text = text .. "  cells " .. whole(before + 1) .. "-" .. whole(before + 3) .. ": " .. whole(a * 256 + b)
+    text = text .. " " .. whole(c * 256 + d) .. " " .. whole(e * 256 + f) .. " mV"
+  elseif real == 2 then
+    text = text .. "  cells " .. whole(before + 1) .. "-" .. whole(before + 2) .. ": " .. whole(a * 256 + b)
+    text = text .. " " .. whole(c * 256 + d) .. " mV"
+  elseif real == 1 then
+    text = text .. "  cell " .. whole(before + 1) .. ": " .. whole(a * 256 + b) .. " mV"
   end
   local cells = frame.table
   if cells then
     local lowest, low_at, highest, high_at, average = statistics(cells)
-    list[#list + 1] = format(
-      " all %d: min %d (cell %d)  max %d (cell %d)  average %.0f  spread %d mV",
-      #cells,
-      lowest,
-      low_at,
-      highest,
-      high_at,
-      average,
-      highest - lowest
-    )
+    text = text
+      .. format(
+        "  all %d: min %d (cell %d)  max %d (cell %d)  average %.0f  spread %d mV",
+        #cells,
+        lowest,
+        low_at,
+        highest,
+        high_at,
+        average,
+        highest - lowest
+      )
   end
-  return concat(list, " ")
+  return text
 end
 
 -- 0x96: frame_number.1 temperature.1 x 7
