@@ -53,12 +53,21 @@ local function keep(board, name, packet, ends)
     board[name] = other
   end
   other.packet, other.ended = packet, ends
+  other.current, other.state = board.current, board.state
   return other
+end
+
+-- Voltages of two moments can be compared where the load was the same: 1 A is 10 of the raw current.
+local function same_load(mine, theirs)
+  if mine.state and theirs.state and mine.state ~= theirs.state then
+    return false
+  end
+  return not mine.current or not theirs.current or math.abs(mine.current - theirs.current) <= 10
 end
 
 -- Two voltages of cells, mV; nothing to say where the highest of one side is 0 (after wake-up).
 local function compare_cells(bus, slot, mine, theirs, what)
-  if mine.max == 0 or theirs.max == 0 then
+  if mine.max == 0 or theirs.max == 0 or not same_load(mine, theirs) then
     return
   end
   local tolerance = bus.times.cell_tolerance
@@ -82,14 +91,20 @@ local function compare_cells(bus, slot, mine, theirs, what)
   end
 end
 
--- Pack voltage (raw, 0.1 V) against the sum of cells (mV).
-local function compare_sum(bus, slot, raw, sum, packet, what)
-  if raw > 0 and sum > 0 and math.abs(raw * 100 - sum) * 100 > bus.times.sum_tolerance * sum then
+-- Pack voltage (raw, 0.1 V) of a 0x90 against the sum of cells (mV) of a table; `theirs`: which of them is the other.
+local function compare_sum(bus, slot, pack, cells, theirs, what)
+  local raw, sum = pack.raw, cells.sum
+  if
+    raw > 0
+    and sum > 0
+    and same_load(pack, cells)
+    and math.abs(raw * 100 - sum) * 100 > bus.times.sum_tolerance * sum
+  then
     contradict(
       bus.results,
       slot,
       "pack_voltage",
-      packet,
+      theirs.packet,
       format("Pack voltage is %.1f V, the cells sum up to %.3f V, %s", raw / 10, sum / 1000, what)
     )
   end
@@ -135,13 +150,13 @@ end
 local take = {} -- by ID; returns what the frame is shown with, or nil
 
 take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
-  local high, low = byte(raw, 5, 6)
-  local voltage = high * 256 + low
+  local high, low, _, _, more, less = byte(raw, 5, 10)
+  board.current = more * 256 + less
   local mine = keep(board, "pack", packet, ends)
-  mine.raw = voltage
+  mine.raw = high * 256 + low
   local cells = board.all_cells
   if is_new(bus, cells, starts) then
-    compare_sum(bus, slot, voltage, cells.sum, cells.packet, "the newest table of 0x95")
+    compare_sum(bus, slot, mine, cells, cells, "the newest table of 0x95")
   end
   return board.state
 end
@@ -248,7 +263,7 @@ function M.feed_table(bus, slot, packet, values, address, id, starts, ends)
     end
     local pack = board.pack
     if is_new(bus, pack, starts) then
-      compare_sum(bus, slot, pack.raw, sum, pack.packet, "the newest 0x90")
+      compare_sum(bus, slot, pack, mine, pack, "the newest 0x90")
     end
     return
   end

@@ -275,7 +275,7 @@ M.experts = {
   raised = ProtoExpert.new("daly.fault.raised", "Fault raised", expert.group.RESPONSE_CODE, expert.severity.WARN),
   cleared = ProtoExpert.new("daly.fault.cleared", "Fault cleared", expert.group.RESPONSE_CODE, expert.severity.NOTE),
   changed = ProtoExpert.new("daly.switched", "State or switch changed", expert.group.RESPONSE_CODE, expert.severity.NOTE),
-  contradiction = ProtoExpert.new("daly.contradictory", "Two records contradict each other", expert.group.PROTOCOL, expert.severity.WARN),
+  contradiction = ProtoExpert.new("daly.contradictory", "Two records contradict each other", expert.group.PROTOCOL, expert.severity.NOTE),
   again = ProtoExpert.new("daly.burst.repeated", "Frame repeated in a burst", expert.group.SEQUENCE, expert.severity.WARN),
 }
 

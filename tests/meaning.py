@@ -377,6 +377,32 @@ CASES: dict[str, list[Heard]] = {
             },
         ),
     ],
+    "the load changed between: state": [
+        Heard(status(3), 0),
+        Heard(a5(1, 0x93, "000101"), 0.1),
+        Heard(THREE, 0.2, TABLE),
+        Heard(a5(1, 0x93, "020101"), 0.3, {"changed": ["state"], "changed_from": 2}),
+        Heard(extremes(3200, 3, 3100, 1), 0.4),
+        Heard(pack(94), 0.5),
+        Heard(cells(1, 3100, 3150, 3200), 0.6, TABLE),
+        Heard(extremes(3300, 3, 3100, 1), 0.7, {"contradiction": ["cell_max"], "contradicts": [7]}),
+    ],
+    "the load changed between: current": [
+        Heard(status(3), 0),
+        Heard(a5(1, 0x90, "00630000 7530 0200".replace(" ", "")), 0.1),
+        Heard(THREE, 0.2, TABLE),
+        Heard(
+            a5(1, 0x90, "00600000 753a 0200".replace(" ", "")),
+            0.3,
+            {
+                "contradiction": ["pack_voltage"],
+                "contradicts": [3],
+            },
+        ),
+        Heard(extremes(3200, 3, 3300, 1), 0.4, {"contradiction": ["cell_max"], "contradicts": [3]}),
+        Heard(a5(1, 0x90, "00600000 753b 0200".replace(" ", "")), 0.5),
+        Heard(extremes(3200, 3, 3300, 1), 0.6),
+    ],
     "temperatures": [
         Heard(status(3, 2), 0),
         Heard(

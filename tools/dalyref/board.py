@@ -34,10 +34,26 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True)
+class Load:
+    """What the board was doing, by its newest 93 and 90; None where there was none."""
+
+    state: int | None
+    current: int | None
+    """Raw, 0.1 A."""
+
+    def like(self, other: Load) -> bool:
+        """Tell whether voltages of the two moments can be compared: same state, currents within 1 A."""
+        if None not in (self.state, other.state) and self.state != other.state:
+            return False
+        return self.current is None or other.current is None or abs(self.current - other.current) <= 10
+
+
+@dataclass(frozen=True, slots=True)
 class Extremes:
     """The highest and the lowest: cells in mV, or temperatures as sent (raw), each with where it was seen."""
 
     seen: Seen
+    load: Load
     high: int
     low: int
 
@@ -47,6 +63,7 @@ class Total:
     """Voltage of the whole pack: raw (0.1 V) of a 90, or the sum of the cells (mV) of a table."""
 
     seen: Seen
+    load: Load
     value: int
 
 
@@ -64,6 +81,7 @@ class Board:
     cells_from: int = 0
     sensors_from: int = 0
     state: int | None = None
+    _current: int | None = None
     _faults: tuple[int, int] | None = None  # bits, packet
     _mos: tuple[bytes, int] | None = None
     _status: tuple[bytes, int] | None = None
@@ -84,17 +102,20 @@ class Board:
             case 0x90:
                 if self.state is not None:
                     fields["daly.pack.state"] = self.state
-                self._pack = Total(seen, int.from_bytes(data[:2]))
+                self._current = int.from_bytes(data[4:6])
+                self._pack = Total(seen, self._load(), int.from_bytes(data[:2]))
                 if self._near(seen, self._sum):
                     self._report(fields, self._compare_sums(self._pack, cast("Total", self._sum), at=self._sum))
             case 0x91:
-                mine = self._cell_extremes = Extremes(seen, int.from_bytes(data[:2]), int.from_bytes(data[3:5]))
+                mine = self._cell_extremes = Extremes(
+                    seen, self._load(), int.from_bytes(data[:2]), int.from_bytes(data[3:5])
+                )
                 found = self._compare_cells(mine, self._cell_table)
                 if self.cells and max(data[2], data[5]) > self.cells:
                     found.append(("cell_number", self.cells_from))
                 self._report(fields, found)
             case 0x92:
-                mine = self._heat_extremes = Extremes(seen, data[0], data[2])
+                mine = self._heat_extremes = Extremes(seen, self._load(), data[0], data[2])
                 found = self._compare_heat(mine, self._heat_table, reported=mine)
                 if self.sensors and max(data[1], data[3]) > self.sensors:
                     found.append(("sensor_number", self.sensors_from))
@@ -110,8 +131,8 @@ class Board:
 
     def cell_table(self, seen: Seen, voltages: Sequence[int], fields: Fields) -> None:
         """Take the voltages (mV) of all cells, of a board whose count is known."""
-        mine = self._cell_table = Extremes(seen, max(voltages), min(voltages))
-        self._sum = Total(seen, sum(voltages))
+        mine = self._cell_table = Extremes(seen, self._load(), max(voltages), min(voltages))
+        self._sum = Total(seen, self._load(), sum(voltages))
         found = self._compare_cells(mine, self._cell_extremes)
         if self._near(seen, self._pack):
             found += self._compare_sums(cast("Total", self._pack), self._sum, at=self._pack)
@@ -123,23 +144,30 @@ class Board:
         if not there:
             self._heat_table = None
             return
-        mine = self._heat_table = Extremes(seen, max(there), min(there))
+        mine = self._heat_table = Extremes(seen, self._load(), max(there), min(there))
         reported = self._heat_extremes
         if reported is not None:
             self._report(fields, self._compare_heat(mine, reported, reported=reported))
+
+    def _load(self) -> Load:
+        return Load(self.state, self._current)
 
     def _near(self, seen: Seen, other: Total | Extremes | None) -> bool:
         return other is not None and seen.start_ns - other.seen.end_ns <= self._age_ns
 
     def _compare_sums(self, pack: Total, total: Total, *, at: Total | None) -> _Findings:
         difference = abs(pack.value * 100 - total.value)
+        if not pack.load.like(total.load):
+            return []
         if at and pack.value and total.value and difference * 100 > self.options.sum_tolerance * total.value:
             return [("pack_voltage", at.seen.number)]
         return []
 
     def _compare_cells(self, mine: Extremes, theirs: Extremes | None) -> _Findings:
         found: _Findings = []
-        if theirs is None or not self._near(mine.seen, theirs) or not mine.high or not theirs.high:
+        if theirs is None or not self._near(mine.seen, theirs) or not mine.load.like(theirs.load):
+            return found
+        if not mine.high or not theirs.high:
             return found
         if abs(mine.high - theirs.high) > self.options.cell_tolerance:
             found.append(("cell_max", theirs.seen.number))
