@@ -29,6 +29,7 @@ local windows = require("daly_windows")
 local view = require("daly_view")
 local serial = require("daly_serial")
 local tcp = require("daly_tcp")
+require("daly_stat")
 
 view.setup(daly)
 daly.fields = field_module.list

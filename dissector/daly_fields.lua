@@ -5,6 +5,7 @@
 -- devices do, see docs/protocol.md).
 
 local faults = require("daly_faults")
+local data_ids = require("daly_data_ids")
 
 local M = {}
 
@@ -21,19 +22,6 @@ local FUNCTION = {
   [0x83] = "Exception to a read",
   [0x86] = "Exception to a write of one",
   [0x90] = "Exception to a write",
-}
-
--- stylua: ignore
-M.DATA_IDS = {
-  [0x90] = "Pack",              -- SOC of total voltage & current
-  [0x91] = "Cell extremes",     -- Maximum & Minimum voltage
-  [0x92] = "Temp. extremes",    -- Maximum & Minimum temperature
-  [0x93] = "MOS status",        -- Charge & discharge MOS status
-  [0x94] = "Status",            -- Status information 1
-  [0x95] = "Cell voltages",     -- Cell voltage 1~48
-  [0x96] = "Temperatures",      -- Cell temperature 1~16
-  [0x97] = "Balance",           -- Cell balance State 1~48
-  [0x98] = "Faults",            -- Battery failure status
 }
 
 M.STATE = STATE
@@ -120,7 +108,7 @@ add("began_in",       "began_in",         packet("Began in",     frametype.NONE,
 -- Frame, V1.2 section 2.3.
 add("start",          "start",            hex(ProtoField.uint8, "Start flag", "A5, fixed; V1.2 2.3"))
 add("address",        "address",          hex(ProtoField.uint8, "Address",    "Request: who asks, 40 PC, 80 Bluetooth app, 20 GPRS, 41..4F PC to board 2..16; reply: board number; V1.2 2.2, field notes fact 3"))
-add("data_id",        "data_id",          hex(ProtoField.uint8, "Data ID",    "What is asked or answered; V1.2 section 3", M.DATA_IDS))
+add("data_id",        "data_id",          hex(ProtoField.uint8, "Data ID",    "What is asked or answered; V1.2 section 3", data_ids))
 add("length",         "length",           plain(ProtoField.uint8, "Data length", "Bytes of data, always 8; V1.2 2.3"))
 add("data",           "data",             bytes("Data",          "The eight data bytes; V1.2 2.3"))
 add("checksum",       "checksum",         hex(ProtoField.uint8, "Checksum",   "Low byte of the sum of all bytes before; V1.2 2.3 note 2"))

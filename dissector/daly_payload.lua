@@ -15,7 +15,7 @@
 --   out.cell, out.made_cell                         the same for a cell's voltage, mV
 
 local fields = require("daly_fields").fields
-local data_ids = require("daly_fields")
+local STATE = require("daly_fields").STATE
 local faults = require("daly_faults")
 local bursts = require("daly_bursts")
 
@@ -25,7 +25,7 @@ local show, words = M.show, M.words
 local byte, format, floor, concat = string.byte, string.format, math.floor, table.concat
 
 local function state_name(state)
-  return data_ids.STATE[state] or format("state %d", state)
+  return STATE[state] or format("state %d", state)
 end
 
 -- Numbers as text, made once: formatting all of a packet's took a fifth of the time of a packet list. At most 65536.

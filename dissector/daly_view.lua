@@ -6,10 +6,13 @@ local field_module = require("daly_fields")
 local payload = require("daly_payload")
 local bursts = require("daly_bursts")
 local exchange = require("daly_exchange")
+local addresses = require("daly_addresses")
+local data_ids = require("daly_data_ids")
 
 local M = {}
 
-local fields, experts, data_ids = field_module.fields, field_module.experts, field_module.DATA_IDS
+local fields, experts = field_module.fields, field_module.experts
+local board_of = addresses.board
 
 local byte, format, concat = string.byte, string.format, table.concat
 
@@ -23,6 +26,10 @@ local packet_comment = Field.new("frame.comment")
 -- The packet at hand: our protocol; what is known of its frames (daly_bus); whether anybody asked for a field of ours,
 -- and whether somebody looks at the tree; whether the capture was read to its end; the medium.
 local daly, results, wanted, visible, again, transport
+
+--- Where somebody counts (daly_stat): called for each record that is shown with the packet's number, the record's kind,
+-- bytes and slot, the list of all cells or sensors that it carries (or false), and the results that its slot is of.
+M.tap = nil
 
 -- Replies that took longer get a note, s.
 local slow = 0.5
@@ -137,16 +144,6 @@ local HOSTS = { [0x40] = "PC", [0x80] = "App", [0x20] = "GPRS" }
 
 local function host_name(address)
   return format("%s 0x%02X", HOSTS[address] or (address > 0x40 and address <= 0x4F and "PC" or "Host"), address)
-end
-
--- Board that a request names, or that replies; nil where it is not known.
-local function board_of(address)
-  if address >= 0x40 and address <= 0x4F then
-    return address - 0x3F
-  elseif address >= 0x01 and address <= 0x10 then
-    return address
-  end
-  return nil
 end
 
 local function id_words(id)
@@ -354,6 +351,7 @@ local function a5(item, raw, slot)
       end
     end
   else
+    frame.table = nil
     if flag or again or exchange.is_write(id) then
       text = request(item, raw, slot, id, flag, text)
     end
@@ -449,7 +447,7 @@ local function begin(parent, buffer, offset, length, kind)
   return tree
 end
 
-local function one_record(parent, buffer, raw, item)
+local function one_record(parent, buffer, raw, item, number)
   local kind = item.kind
   local offset, length = item.at, item.length
   if item.bytes then
@@ -475,6 +473,9 @@ local function one_record(parent, buffer, raw, item)
   end
   if visible and kind ~= "event" then
     node:append_text(", " .. text)
+  end
+  if M.tap then
+    M.tap(number, kind, raw, item.slot, kind == "frame" and item.dialect == "a5" and frame.table, results)
   end
   return text, source, destination
 end
@@ -503,7 +504,7 @@ function M.several(parent, buffer, raw, items, pinfo)
     if items[i].part then
       text = one_part(parent, buffer, items[i])
     else
-      text, from, to = one_record(parent, buffer, raw, items[i])
+      text, from, to = one_record(parent, buffer, raw, items[i], pinfo.number)
     end
     if i <= MOST_WORDS then
       texts[i] = text
@@ -537,6 +538,9 @@ function M.whole(parent, buffer, raw, slot, pinfo)
   cols.dst = destination
   if visible then
     node:append_text(", " .. text)
+  end
+  if M.tap then
+    M.tap(pinfo.number, "frame", raw, slot, frame.table, results)
   end
 end
 

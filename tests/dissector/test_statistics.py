@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""``tshark -q -z daly,stat``, ``daly,cells`` and ``daly,faults``: numbers counted by hand, and by the reference."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from tests.dissector.dissection import EPOCH_NS, P, a5
+
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
+from dalycapture.reader import read_capture
+from dalyref.decoder import decode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dalytools.tshark import Tshark
+
+SAMPLES = sorted(Path(__file__).resolve().parents[2].joinpath("pcap_samples").glob("*.pcap*"))
+FRAME_S = 13 * 10 / 9600
+ASK, ANSWER = a5(0x40, 0x90), a5(1, 0x90, "0215000075300200")
+
+
+def capture(tshark: Tshark, packets: Sequence[P]) -> Path:
+    path = tshark.home / "statistics.pcapng"
+    with open_writer(path) as writer:
+        writer.add_interface(Interface("made", "dalyshark bus=main"))
+        for packet in packets:
+            writer.write_packet(EPOCH_NS + round(packet.at * 1e9), bytes.fromhex(packet.hex))
+    path.chmod(0o644)
+    return path
+
+
+def ask(tshark: Tshark, path: Path, *reports: str, passes: Sequence[str] = ()) -> str:
+    words = [word for report in reports for word in ("-z", report)]
+    done = tshark.run(*passes, "-q", "-o", "daly.link_types:147,148,150-162", "-r", str(path), *words)
+    assert done.returncode == 0, done.stderr
+    assert b"Lua" not in done.stderr, done.stderr
+    return done.stdout.decode()
+
+
+def rows(text: str) -> dict[tuple[str, str], list[str]]:
+    """The lines of daly,stat: (board, ID) -> columns behind the name."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for line in text.splitlines():
+        if line[6:8] == "0x":
+            found[line[:5].strip(), line[6:10]] = line[26:].split()
+    return found
+
+
+SESSION = [
+    P(ASK, 0),  # answered after 50 ms
+    P(ANSWER, FRAME_S + 0.050),
+    P(ASK, 1),  # echo
+    P(ASK, 1.02),
+    P(ASK, 1.5),  # again; answered after 100 ms
+    P(ANSWER, 1.5 + FRAME_S + 0.1),
+    P(a5(0x80, 0x93), 2),  # nobody answers
+    P(ANSWER[:-2] + "00", 4),
+    P("00ff", 5),
+    P("", 6),
+]
+
+
+@pytest.mark.parametrize("passes", [(), ("-2",), ("-2", "-Y", "frame")], ids=["one", "two", "two with a tree"])
+def test_requests_and_replies(tshark: Tshark, passes: tuple[str, ...]) -> None:
+    text = ask(tshark, capture(tshark, SESSION), "daly,stat", passes=passes)
+    assert "10 records: 8 frames" not in text
+    assert "10 records: 7 frames, 1 with a bad checksum, 1 junk, 1 events; 106 bytes in 6.000 s" in text
+    assert "boards that answer: 1\n" in text
+    #       requests replies no rep again echo damage min mean 95 % max
+    assert rows(text) == {
+        ("1", "0x90"): ["3", "2", "1", "1", "1", "1", "50.0", "75.0", "100.0", "100.0"],
+        ("any", "0x93"): ["1", "0", "1", "0", "0", "0"],
+    }
+
+
+def test_a_filter_picks_packets(tshark: Tshark) -> None:
+    text = ask(tshark, capture(tshark, SESSION), "daly,stat,daly.data_id == 0x93")
+    assert rows(text) == {("any", "0x93"): ["1", "0", "1", "0", "0", "0"]}
+    assert "filter: daly.data_id == 0x93" in text
+
+
+def test_several_at_once(tshark: Tshark) -> None:
+    path = capture(tshark, SESSION)
+    both = ask(tshark, path, "daly,stat", "daly,faults", "daly,stat,daly.retry")
+    assert both.count("10 records") == 1
+    assert "No 0x98 was seen." in both
+    assert "1 records: 1 frames" in both
+
+
+@pytest.mark.parametrize("report", ["stat", "cells", "faults"])
+def test_an_empty_capture_says_so(tshark: Tshark, report: str) -> None:
+    assert "No " in ask(tshark, capture(tshark, []), f"daly,{report}")
+
+
+def test_several_records_in_a_packet(tshark: Tshark) -> None:
+    text = ask(tshark, capture(tshark, [P(ASK + ANSWER, 0), P(ASK + ANSWER, 1)]), "daly,stat")
+    assert rows(text)["1", "0x90"][:2] == ["2", "2"]
+
+
+@pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
+def test_the_reference_counts_the_same(tshark: Tshark, sample: Path) -> None:
+    found = rows(ask(tshark, tshark.readable(sample), "daly,stat"))
+    requests, replies, missing, again, echoes, damaged = (Counter[tuple[str, str]]() for _ in range(6))
+    for record in decode(read_capture(sample)):
+        fields = record.fields
+        if fields.get("daly.dialect") != "a5" or record.kind.value not in ("frame", "bad_checksum"):
+            continue
+        address = int(str(fields["daly.address"]))
+        board = address if 1 <= address <= 16 else address - 0x3F if 0x40 <= address <= 0x4F else 0
+        key = str(board) if board else "any", f"0x{int(str(fields['daly.data_id'])):02X}"
+        direction = fields.get("daly.direction")
+        damaged[key] += direction is None
+        requests[key] += direction == 1
+        replies[key] += direction == 2
+        echoes[key] += direction == 3
+        again[key] += "daly.retry" in fields
+        missing[key] += "daly.unanswered" in fields
+    assert {key: [int(word) for word in words[:6]] for key, words in found.items()} == {
+        key: [count[key] for count in (requests, replies, missing, again, echoes, damaged)] for key in requests
+    }
+
+
+def test_cells_and_sensors(tshark: Tshark) -> None:
+    def table(*mv: int) -> str:
+        return a5(1, 0x95, "01" + "".join(f"{v:04x}" for v in mv))
+
+    packets = [
+        P(a5(1, 0x94, "0303"), 0),
+        P(table(3300, 3310, 3320), 1),
+        P(a5(1, 0x96, "013c00ff"), 2),  # 20 C, two that are not there
+        P(table(3302, 3310, 3298), 3),
+    ]
+    text = ask(tshark, capture(tshark, packets), "daly,cells")
+    lines = [line.split() for line in text.splitlines()]
+    assert ["1", "2", "3300", "3301.0", "3302", "3302", "1", "x", "0", "x"] in lines
+    assert ["2", "2", "3310", "3310.0", "3310", "3310", "0", "x", "1", "x"] in lines
+    assert ["3", "2", "3298", "3309.0", "3320", "3298", "1", "x", "1", "x"] in lines
+    assert ["spread", "2", "12", "16.0", "20", "12"] in lines
+    assert ["1", "1", "20", "20.0", "20", "20", "1", "x", "1", "x"] in lines
+
+
+def test_faults_come_and_go(tshark: Tshark) -> None:
+    packets = [P(a5(1, 0x98, "01"), 0), P(a5(1, 0x98, "02"), 2), P(a5(1, 0x98, "02"), 5), P(a5(2, 0x98), 6)]
+    lines = ask(tshark, capture(tshark, packets), "daly,faults").splitlines()
+    said = [" ".join(line.split()) for line in lines]
+    assert "0.000000 1 1 already there cell_volt_high_level_1" in said
+    assert "2.000000 2 1 raised cell_volt_high_level_2" in said
+    assert "2.000000 2 1 cleared cell_volt_high_level_1, after 2.000 s" in said
+    assert "Board 1, after 3 replies to 0x98: cell_volt_high_level_2 (for 3.000 s)" in said
+    assert "Board 2, after 1 replies to 0x98: none" in said
