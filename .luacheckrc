@@ -14,7 +14,7 @@ files["dissector"] = {
     "Tvb", "TvbRange", "ByteArray", "Column", "Columns", "Pinfo", "TreeItem", "Address", "Int64", "UInt64", "NSTime",
     "heuristics_table", "all_field_infos",
     -- constants
-    "base", "ftypes", "expert", "wtap", "wtap_encaps", "wtap_filetypes", "wtap_presence_flags", "wtap_tsprecs",
+    "base", "ftypes", "expert", "wtap", "wtap_encaps", "wtap_filetypes", "wtap_presence_flags", "wtap_rec_types", "wtap_tsprecs",
     "frametype", "PI_CHECKSUM", "PI_DEBUG", "PI_ERROR", "PI_MALFORMED", "PI_NOTE", "PI_PROTOCOL", "PI_REASSEMBLE",
     "PI_RESPONSE_CODE", "PI_SEQUENCE", "PI_UNDECODED", "PI_WARN", "MENU_ANALYZE_UNSORTED", "MENU_PACKET_ANALYZE_UNSORTED",
     "MENU_STAT_GENERIC", "MENU_STAT_UNSORTED", "MENU_TOOLS_UNSORTED", "ENC_BIG_ENDIAN", "ENC_LITTLE_ENDIAN",

@@ -30,6 +30,7 @@ local view = require("daly_view")
 local serial = require("daly_serial")
 local tcp = require("daly_tcp")
 require("daly_stat")
+require("daly_hexlog")
 
 view.setup(daly)
 daly.fields = field_module.list
