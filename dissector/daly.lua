@@ -29,8 +29,8 @@ local windows = require("daly_windows")
 local view = require("daly_view")
 local serial = require("daly_serial")
 local tcp = require("daly_tcp")
-require("daly_stat")
-require("daly_hexlog")
+require("daly_stat").register()
+require("daly_hexlog").register()
 
 view.setup(daly)
 daly.fields = field_module.list

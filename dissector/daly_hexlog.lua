@@ -14,6 +14,8 @@ if not FileHandler then
   return
 end
 
+local M = {}
+
 -- A file is taken for a hex log when the first of so many lines is of the form, and at least half of them, none is too
 -- long, and one holds what a Daly frame can begin with.
 local LINES_LOOKED_AT, LONGEST_LINE = 10, 8192
@@ -149,23 +151,33 @@ local function parse(line)
   return seconds, fraction, bytes, only_day
 end
 
-local reader =
-  FileHandler.new("Daly hex log", "dalyhexlog", "A terminal's hex log: a time stamp and bytes on each line", "rms")
-
--- A line of the file, bounded; a longer one comes in pieces.
+-- The next line of the file; of a longer one than LONGEST_LINE, a piece. nil at the end.
 local function next_line(file)
-  local line = file:read("*l")
-  return line and line:gsub("\r$", "") or nil
+  local position = file:seek("cur")
+  for _, size in ipairs({ 256, LONGEST_LINE }) do
+    local text = file:read(size)
+    if not text or text == "" then
+      return nil
+    end
+    local stop = text:find("\n", 1, true)
+    if stop then
+      file:seek("set", position + stop)
+      return (text:sub(1, stop - 1):gsub("\r$", ""))
+    elseif #text < size or size == LONGEST_LINE then
+      return (text:gsub("\r$", ""))
+    end
+    file:seek("set", position)
+  end
 end
 
-function reader.read_open(file, capture)
+local function read_open(file, capture)
   local looked, understood, daly = 0, 0, false
   while looked < LINES_LOOKED_AT do
     local line = next_line(file)
     if not line then
       break
     end
-    if #line > LONGEST_LINE or line:find(BINARY) then
+    if #line >= LONGEST_LINE or line:find(BINARY) then
       return false
     end
     if not is_comment(line) then
@@ -214,7 +226,7 @@ local function fill(line, frame, known)
   return true
 end
 
-function reader.read(file, capture, frame)
+local function read(file, capture, frame)
   local known = capture.private_table
   while true do
     local position = file:seek("cur")
@@ -229,7 +241,7 @@ function reader.read(file, capture, frame)
   end
 end
 
-function reader.seek_read(file, _, frame, offset)
+local function seek_read(file, _, frame, offset)
   file:seek("set", offset)
   local line = next_line(file)
   if not line then
@@ -239,5 +251,13 @@ function reader.seek_read(file, _, frame, offset)
   return fill(line, frame, { last = 0, day = 0 })
 end
 
-reader.extensions = "log;txt;hex"
-register_filehandler(reader)
+--- Make it known to Wireshark; once (some versions load each module twice).
+function M.register()
+  local text = "A terminal's hex log: a time stamp and bytes on each line"
+  local reader = FileHandler.new("Daly hex log", "dalyhexlog", text, "rms")
+  reader.read_open, reader.read, reader.seek_read = read_open, read, seek_read
+  reader.extensions = "log;txt;hex"
+  register_filehandler(reader)
+end
+
+return M

@@ -8,6 +8,8 @@
 
 local view = require("daly_view")
 
+local M = {}
+
 local REPORTS = {
   { name = "stat", title = "Requests and replies", make = require("daly_stat_exchange").new },
   { name = "cells", title = "Cells and sensors", make = require("daly_stat_cells").new },
@@ -54,17 +56,6 @@ local function heading(report, filter)
   return text .. "\n" .. ("="):rep(#text) .. "\n"
 end
 
-for i = 1, #REPORTS do
-  local report = REPORTS[i]
-  local word = "daly," .. report.name
-  register_stat_cmd_arg(word, function(argument)
-    local filter = argument:sub(#word + 2)
-    listen(report, filter, function(text)
-      print(heading(report, filter) .. text)
-    end)
-  end)
-end
-
 -- Windows -----------------------------------------------------------------------------------------
 
 local function open_window(report, filter)
@@ -90,11 +81,23 @@ local function open_window(report, filter)
   retap_packets()
 end
 
-if gui_enabled() then
+--- Make the commands and the menu; once (some versions load each module twice).
+function M.register()
   for i = 1, #REPORTS do
     local report = REPORTS[i]
-    register_menu("Daly BMS/" .. report.title, function()
-      open_window(report, "")
-    end, MENU_TOOLS_UNSORTED)
+    local word = "daly," .. report.name
+    register_stat_cmd_arg(word, function(argument)
+      local filter = argument:sub(#word + 2)
+      listen(report, filter, function(text)
+        print(heading(report, filter) .. text)
+      end)
+    end)
+    if gui_enabled() then
+      register_menu("Daly BMS/" .. report.title, function()
+        open_window(report, "")
+      end, MENU_TOOLS_UNSORTED)
+    end
   end
 end
+
+return M
