@@ -6,7 +6,7 @@ RUN_SETUP := @tools/setup.sh run
 DEV_SETUP := @tools/setup.sh dev
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format matrix soak bench samples docs wheel clean
+.PHONY: help setup run test lint format matrix soak bench samples docs dist wheel clean
 MAKEFLAGS += --no-builtin-rules
 
 help: ## show this list
@@ -49,6 +49,10 @@ samples: ## make pcap_samples/ again
 docs: ## write docs/fields.md again, from the dissector
 	$(DEV_SETUP)
 	@$(PY) docs/make_fields.py
+
+dist: ## the dissector in one file, and a zip with the profile, in dist/
+	$(DEV_SETUP)
+	@$(PY) tools/make_dist.py
 
 wheel: ## build dist/*.whl and dist/*.tar.gz
 	$(DEV_SETUP)

@@ -93,19 +93,17 @@ function out.cell(field, first, length, number, value)
   end
 end
 
--- One cell of the table, as one of all and by its own field.
+-- One cell of the table: a line by the cell's own field, and inside it the same as one of all.
 function out.made_cell(field, own, value, lowest, highest)
-  if visible or referenced(tree, field) then
-    local item = set_generated(add(tree, field, value))
+  local line = tree
+  if visible or referenced(tree, own) then
+    line = set_generated(add(tree, own, value))
     if visible then
-      item:set_hidden() -- its own field shows it
+      append_text(line, lowest and highest and " mV" or lowest and " mV, lowest" or highest and " mV, highest" or " mV")
     end
   end
-  if visible or referenced(tree, own) then
-    local item = add(tree, own, value):set_generated()
-    if visible then
-      append_text(item, lowest and highest and " mV" or lowest and " mV, lowest" or highest and " mV, highest" or " mV")
-    end
+  if visible or referenced(tree, field) then
+    set_generated(add(line, field, value))
   end
 end
 

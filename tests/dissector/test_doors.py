@@ -97,7 +97,7 @@ class Connection:
         """One segment; `at`: sequence number, of one that is out of order or sent again. Returns its number."""
         data = bytes.fromhex(text)
         sequence = self.next[side] if at is None else at
-        ends = ("10.0.0.2", 40000), ("10.0.0.9", 4001)
+        ends = ("10.0.0.2", 51234), ("10.0.0.9", 4001)
         (src, sport), (dst, dport) = ends[side], ends[1 - side]
         packet = (
             Ether(src="02:00:00:00:00:01", dst="02:00:00:00:00:02")
@@ -209,7 +209,7 @@ def test_two_connections_are_two_buses(tshark: Tshark, open_folder: Path) -> Non
     connection.send(0, REQUEST)
     connection.send(1, REPLY)
     other = connection.packets[1].copy()
-    other[TCP].dport = 40001
+    other[TCP].dport = 51235
     other.time = EPOCH + 0.02
     connection.packets.append(other)
     rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.request_in"])

@@ -25,6 +25,9 @@ COMMANDS = {
     "capture": "sniff a bus to a file or a pipe",
     "decode": "show what the reference decoder reads in a capture",
     "check": "hold the Wireshark dissector against the reference decoder",
+    "install": "the dissector and the profile into Wireshark's personal folders",
+    "uninstall": "take them away again",
+    "doctor": "what is there, what is missing, and how to get it",
     "simulate": "a bus with boards and a host on pseudo-terminals",
 }
 

@@ -186,9 +186,15 @@ class Tshark:
             raise Problem(f"the dissector is not where it should be: {source}; install dalyshark again")
         lua = self._home / "lua"
         lua.mkdir()
-        for file in source.glob("*.lua"):
+        own = os.environ.get("DALYSHARK_DISSECTOR")
+        if own and not Path(own).is_file():
+            raise Problem(f"DALYSHARK_DISSECTOR is {own}, which is no file; name a dissector of one file, or unset it")
+        for file in () if own else source.glob("*.lua"):
             shutil.copyfile(file, lua / file.name)
             (lua / file.name).chmod(0o644)
+        if own:
+            shutil.copyfile(own, self._lua)
+            self._lua.chmod(0o644)
         proof = self._home / "proof.pcap"
         proof.write_bytes(_PROOF)
         for folder in (self._home, lua):
