@@ -6,7 +6,7 @@ RUN_SETUP := @tools/setup.sh run
 DEV_SETUP := @tools/setup.sh dev
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format matrix soak bench samples docs dist wheel clean
+.PHONY: help setup run test lint format matrix soak fuzz bench samples docs dist wheel clean
 MAKEFLAGS += --no-builtin-rules
 
 help: ## show this list
@@ -37,6 +37,10 @@ matrix: ## the dissector's tests in several versions of Wireshark; make matrix A
 soak: ## a million records, good and damaged, through both readings
 	$(DEV_SETUP)
 	@$(PY) -m bench.soak $(ARGS)
+
+fuzz: ## a million mutated packets through the dissector, in every Wireshark that make matrix fetched
+	$(DEV_SETUP)
+	@$(PY) -m bench.fuzz $(ARGS)
 
 bench: ## speed and memory, beside named peers
 	$(DEV_SETUP)
