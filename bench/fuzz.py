@@ -4,7 +4,7 @@
     mutations    bits flipped, bytes cut, two samples spliced, lengths changed, packets snapped short, random bytes
     carriers     USER0 packets; the same in TCP segments of a serial server
 
-No Lua error, no abort, no hang may come of it. Which tsharks: this machine's own, and those that ``make matrix`` fetched.
+No Lua error, no abort, no hang may come of it. The tsharks: this machine's own, and those that ``make matrix`` fetched.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def main() -> int:
             wrong = fuzz(tshark, options.packets, options.seed)
             seconds = time.monotonic() - began
             sys.stdout.write(
-                f"tshark {tshark.version}: {options.packets} packets in {seconds:.0f} s, {len(wrong)} files with errors\n"
+                f"tshark {tshark.version}: {options.packets} packets, {seconds:.0f} s, {len(wrong)} files with errors\n"
             )
         for line in wrong:
             sys.stdout.write(f"  {line}\n")

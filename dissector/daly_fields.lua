@@ -29,27 +29,55 @@ M.STATE = STATE
 local fields = {} -- by short name
 local list = {} -- as Wireshark wants them
 
+-- How sure each is, behind its description in brackets: "documented" in the vendor's paper V1.2, "generated" by us, and, where
+-- the field notes know more or otherwise:
+local SURE = {
+  ["daly.address"] = "documented; more host addresses are seen by several",
+  ["daly.pack.gather_voltage"] = "documented; 0 on every device seen",
+  ["daly.pack.current"] = "documented; its sign is contradicted",
+  ["daly.life"] = "documented; taken for cycles by some programs, wrongly",
+  ["daly.charger"] = "documented; seen wrong by one",
+  ["daly.cycles"] = "seen by several",
+  ["daly.frame_number"] = "documented from 0, contradicted: from 1 on every device seen",
+  ["daly.balance.mask"] = "documented; contradicted by boards with an active balancer",
+  ["daly.balance.cell"] = "documented; contradicted by boards with an active balancer",
+  ["daly.balance.active_cell"] = "seen by two",
+  ["daly.fault.mos_off_by_command"] = "seen by several",
+  ["daly.fault.charging_cabinet_offline"] = "another vendor paper, not seen",
+  ["daly.text_part"] = "seen by several",
+  ["daly.manufacturer"] = "seen once",
+  ["daly.battery_name"] = "seen once",
+  ["daly.battery_code"] = "seen by several",
+  ["daly.software_version"] = "seen by several",
+  ["daly.hardware_version"] = "seen by several",
+  ["daly.serial_number"] = "seen once",
+  ["daly.reserved"] = "seen by several",
+  ["daly.undecoded"] = "as on the wire",
+  ["daly.modbus.address"] = "seen by several",
+}
+
+local function sure(abbreviation, description)
+  local word = SURE[abbreviation]
+    or description:find("generated", 1, true) and "generated"
+    or (description:find("V1.2", 1, true) or description:find("vendor's article", 1, true)) and "documented"
+  return word and description .. " [" .. word .. "]" or description
+end
+
 local function add(short, abbreviation, make)
   local field = make("daly." .. abbreviation)
   fields[short] = field
   list[#list + 1] = field
 end
 
-local function u8(name, text, values, description)
-  return function(abbreviation)
-    return ProtoField.uint8(abbreviation, name, values and base.DEC or base.DEC, values, nil, description or text)
-  end
-end
-
 local function plain(make, name, description)
   return function(abbreviation)
-    return make(abbreviation, name, base.DEC, nil, nil, description)
+    return make(abbreviation, name, base.DEC, nil, nil, sure(abbreviation, description))
   end
 end
 
 local function hex(make, name, description, values)
   return function(abbreviation)
-    return make(abbreviation, name, base.HEX, values, nil, description)
+    return make(abbreviation, name, base.HEX, values, nil, sure(abbreviation, description))
   end
 end
 
@@ -58,37 +86,39 @@ local function number(name, description)
 end
 
 local function named(name, values, description)
-  return u8(name, nil, values, description)
+  return function(abbreviation)
+    return ProtoField.uint8(abbreviation, name, base.DEC, values, nil, sure(abbreviation, description))
+  end
 end
 
 local function double(name, description)
   return function(abbreviation)
     -- The short constructor's arguments differ between versions.
-    return ProtoField.new(name, abbreviation, ftypes.DOUBLE, nil, base.NONE, nil, description)
+    return ProtoField.new(name, abbreviation, ftypes.DOUBLE, nil, base.NONE, nil, sure(abbreviation, description))
   end
 end
 
 local function text(name, description)
   return function(abbreviation)
-    return ProtoField.new(name, abbreviation, ftypes.STRING, nil, base.NONE, nil, description)
+    return ProtoField.new(name, abbreviation, ftypes.STRING, nil, base.NONE, nil, sure(abbreviation, description))
   end
 end
 
 local function bytes(name, description)
   return function(abbreviation)
-    return ProtoField.bytes(abbreviation, name, base.NONE, description)
+    return ProtoField.bytes(abbreviation, name, base.NONE, sure(abbreviation, description))
   end
 end
 
 local function boolean(name, description)
   return function(abbreviation)
-    return ProtoField.bool(abbreviation, name, base.NONE, nil, nil, description)
+    return ProtoField.bool(abbreviation, name, base.NONE, nil, nil, sure(abbreviation, description))
   end
 end
 
 local function packet(name, kind, description)
   return function(abbreviation)
-    return ProtoField.framenum(abbreviation, name, base.NONE, kind, nil, description)
+    return ProtoField.framenum(abbreviation, name, base.NONE, kind, nil, sure(abbreviation, description))
   end
 end
 
@@ -98,7 +128,7 @@ local u16, u32 = ProtoField.uint16, ProtoField.uint32
 
 -- Every record.
 add("kind",           "kind",             text("Record",         "What the record is: frame, bad_checksum, short, junk, foreign, event; generated (docs/records.md)"))
-add("transport",      "transport",        text("Transport",      "The medium: uart; generated"))
+add("transport",      "transport",        text("Transport",      "The medium: uart, tcp; generated"))
 add("dialect",        "dialect",          text("Dialect",        "a5, d2 or 81: which of Daly's protocols; generated"))
 add("undecoded",      "undecoded",        bytes("Bytes",         "Bytes that are shown as they are"))
 add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, or Sinowealth with right CRC-8; generated"))

@@ -43,6 +43,16 @@ def test_every_field_has_a_description(fields: list[tuple[str, str, str, str]]) 
     assert not bare
 
 
+def test_every_field_says_how_sure_it_is(fields: list[tuple[str, str, str, str]]) -> None:
+    words = ("documented", "seen", "generated", "as on the wire", "another vendor paper")
+    unsure = [
+        name
+        for _, name, kind, description in fields
+        if kind != EXPERT and not (description.endswith("]") and description.rpartition("[")[2].startswith(words))
+    ]
+    assert not unsure
+
+
 # What the paper (V1.2, sections 2 and 3) gives these in.
 UNITS = {
     "daly.pack.voltage": "V",
