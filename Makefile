@@ -50,9 +50,10 @@ samples: ## make pcap_samples/ again
 	$(DEV_SETUP)
 	@$(PY) pcap_samples/make_samples.py
 
-docs: ## write docs/fields.md again, from the dissector
+docs: ## write docs/fields.md and the outputs in docs/statistics.md again
 	$(DEV_SETUP)
 	@$(PY) docs/make_fields.py
+	@$(PY) docs/make_statistics.py
 
 dist: ## the dissector in one file, and a zip with the profile, in dist/
 	$(DEV_SETUP)
