@@ -88,7 +88,7 @@ end
 
 -- Packets -----------------------------------------------------------------------------------------
 
-function daly.init()
+local function begin()
   windows.recognise_modbus(prefs.modbus)
   local options = {
     baud = math.max(1, prefs.baud),
@@ -175,9 +175,17 @@ local function claim_ports()
   claimed_ports = wanted
 end
 
-function daly.prefs_changed()
+local function take_doors()
   claim()
   claim_ports()
+end
+
+daly.prefs_changed = take_doors
+
+-- Here too: some programs (sharkd) change preferences without telling.
+function daly.init()
+  take_doors()
+  begin()
 end
 
 claim()

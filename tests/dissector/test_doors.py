@@ -13,6 +13,10 @@ from scapy.layers.l2 import Ether
 from scapy.packet import Packet, Raw
 from scapy.utils import wrpcap
 from tests.dissector.dissection import Dissect, P, a5, in_a_row, kinds, numbers
+from tests.dissector.test_views import Sharkd
+
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -230,3 +234,39 @@ def test_the_echo_time_is_a_preference(dissect: Dissect) -> None:
     packets = [P(REQUEST), P(REQUEST, 0.0542)]
     assert numbers(dissect(packets)[1], "direction") == [3]
     assert numbers(dissect(packets, options=["daly.echo:30"])[1], "direction") == [1]
+
+
+def test_a_preference_changes_a_loaded_file(tshark: Tshark, open_folder: Path) -> None:
+    """The file is open, the preference changes, the file is read anew: the door opens, and closes again."""
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    path = connection.save()
+    path.chmod(0o644)
+    server = Sharkd(tshark, path)
+    try:
+        assert "Daly BMS" not in str(server.tree(1))
+        server.ask("setconf", name="daly.tcp_ports", value="4001")
+        server.ask("load", file=str(path))
+        assert "Daly BMS" in str(server.tree(1))
+        server.ask("setconf", name="daly.tcp_ports", value="4002")
+        server.ask("load", file=str(path))
+        assert "Daly BMS" not in str(server.tree(1))
+    finally:
+        server.close()
+
+
+def test_limits_change_on_a_loaded_file(tshark: Tshark, open_folder: Path) -> None:
+    path = open_folder / "echo.pcapng"
+    with open_writer(path) as writer:
+        writer.add_interface(Interface("made", "dalyshark bus=main"))
+        for at in (0, 54_200_000):
+            writer.write_packet(EPOCH * 1_000_000_000 + at, bytes.fromhex(REQUEST))
+    path.chmod(0o644)
+    server = Sharkd(tshark, path)
+    try:
+        assert "Direction: Echo" in str(server.tree(2))
+        server.ask("setconf", name="daly.echo", value="30")
+        server.ask("load", file=str(path))
+        assert "Direction: Request" in str(server.tree(2))
+    finally:
+        server.close()

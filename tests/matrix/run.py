@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The dissector's tests, and `dalyshark check` over all samples, in several versions of Wireshark: `make matrix`.
+"""The dissector's tests, and `dalyshark check` over all samples (also with the dissector of one file), in several
+versions of Wireshark: `make matrix`.
 
     python tests/matrix/run.py [MEMBER ...]
 
@@ -97,6 +98,12 @@ def check(member: str, environment: Mapping[str, str]) -> tuple[bool, str]:
     return status == 0, f"{len(samples)} samples " + {0: "clean", 1: "with findings"}.get(status, f"status {status}")
 
 
+def bundled() -> str:
+    """Make the dissector of one file; return its path."""
+    run("dist", [BIN / "python", ROOT / "tools" / "make_dist.py"], {})
+    return str(ROOT / "dist" / "dalyshark.lua")
+
+
 def programs(member: str) -> dict[str, str]:
     """Return the environment that makes the tests use this member's programs; fetches the member first if need be."""
     if member == "installed":
@@ -144,7 +151,8 @@ def row(member: str) -> Row:
     wireshark, lua = versions(environment)
     tested, tests = pytest(member, "tests/dissector", environment)
     checked, findings = check(member, environment)
-    return Row(member, wireshark, lua, tests, findings, tested and checked)
+    in_one, one_file = check(f"{member}-one-file", {**environment, "DALYSHARK_DISSECTOR": bundled()})
+    return Row(member, wireshark, lua, tests, f"{findings}; in one file {one_file}", tested and checked and in_one)
 
 
 def main(named: Sequence[str]) -> int:
