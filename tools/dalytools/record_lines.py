@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from dalyref import texts
 from dalyref.kinds import Kind
 from dalytools.terminal_text import plain
 
@@ -47,7 +48,11 @@ NAMES = {
 """Data IDs: the vendor's paper V1.2 section 3, and what devices answer besides (field notes, a.2 and a.3)."""
 
 STATES = {0: "stationary", 1: "charging", 2: "discharging"}
-_TEXTS = frozenset((0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
+_TROUBLE = {
+    "daly.other_board": "another board than was asked",
+    "daly.burst.repeat": "the same part again",
+    "daly.burst.cut_off": "cut off here",
+}
 _FILLERS = frozenset((bytes(8), b"\xaa" * 8))
 _MOST_BYTES = 32
 _MOST_COMMENT = 300
@@ -74,7 +79,7 @@ class Line:
         return (
             f"{self.number:>6}  {self.time}  ",
             f"{self.who:<19}",
-            f"{self.what:<22}",
+            f"{self.what:<21} ",
             f"{self.values}  " if self.values else "",
             f"! {self.warnings}" if self.warnings else "",
         )
@@ -139,28 +144,41 @@ def _a5(record: Decoded) -> tuple[str, str, str, str, str]:
     warnings: list[str] = []
     if fields["daly.direction"] != 2:
         who = f"host {data[1]:02X}" + (f" > board {board}" if board else "")
-        values = "" if content in _FILLERS else _hex(content)
+        values = "" if content in _FILLERS and "daly.write" not in fields else _hex(content)
         if fields["daly.direction"] == 3:
             return "echo", who, what, values, "echo: the battery sleeps, or the adapter hears itself"
         if "daly.retry" in fields:
             warnings.append("retry")
+        if "daly.second_host" in fields:
+            warnings.append("a second host asks")
         if "daly.reply_in" not in fields:
             warnings.append("no reply")
-        return "request", who, f"{what}?", values, ", ".join(warnings)
+        asked = f"WRITE {what}" if "daly.write" in fields else f"{what}?"
+        return "request", who, asked, values, ", ".join(warnings)
     who = f"board {board}" if board else f"address {data[1]:02X}"
     told = _VALUES.get(data_id)
     if told:
         values = told(fields)
-    elif data_id in _TEXTS:
-        values = f"part {content[0]}: {plain(content[1:].decode('latin-1'))}"
+    elif data_id in texts.FIELDS:
+        whole = fields.get(texts.FIELDS[data_id])
+        values = f"part {content[0]}: {fields['daly.text_part']}" + (f'  = "{whole}"' if whole else "")
     else:
         values = _hex(content)
     if "daly.response_time" in fields:
         values += f"  ({float(str(fields['daly.response_time'])) * 1000:.0f} ms)"
+    if result := fields.get("daly.write_result"):
+        warnings.append(f"write {result}")
+    warnings += [words for name, words in _TROUBLE.items() if name in fields]
+    if late := fields.get("daly.late_to"):
+        warnings.append(f"late, asked in {late}")
+    elif "daly.unasked" in fields:
+        warnings.append("nobody asked")
     if missing := _words(fields, "daly.burst.missing"):
         warnings.append(f"missing part {missing}")
-    if "daly.burst.repeat" in fields:
-        warnings.append("the same part again")
+    if changed := _words(fields, "daly.changed"):
+        warnings.append(f"changed: {changed}")
+    for name, number in zip(_listed(fields, "daly.contradiction"), _listed(fields, "daly.contradicts"), strict=True):
+        warnings.append(f"{name} contradicts {number}")
     if raised := _words(fields, "daly.fault_raised"):
         warnings.append(f"came: {raised}")
     if cleared := _words(fields, "daly.fault_cleared"):
@@ -239,8 +257,11 @@ def _balance(fields: Fields) -> str:
     return f"cells {cells}  (or, with an active balancer: cell {fields['daly.balance.active_cell']})"
 
 
+_FAULT = "daly.fault."
+
+
 def _faults(fields: Fields) -> str:
-    named = [name.removeprefix("daly.fault.") for name, on in fields.items() if on is True]
+    named = [name.removeprefix(_FAULT) for name, on in fields.items() if on is True and name.startswith(_FAULT)]
     code = fields["daly.fault_code"]
     return "  ".join((*(named or ["none"]), *([f"code {code}"] if code else [])))
 
