@@ -39,7 +39,7 @@ FIELDS = {
 
 #        what              arguments of tshark              most it may be, as a multiple of mbrtu
 MODES = (
-    ("packet list", (), 8.0),
+    ("packet list", (), 7.0),
     ("-T fields, 5 fields", ("-T", "fields"), 12.0),
     ("-2 -T fields, 5 fields", ("-2", "-T", "fields"), None),
 )
