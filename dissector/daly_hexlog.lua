@@ -254,7 +254,7 @@ end
 --- Make it known to Wireshark; once (some versions load each module twice).
 function M.register()
   local text = "A terminal's hex log: a time stamp and bytes on each line"
-  local reader = FileHandler.new("Daly hex log", "dalyhexlog", text, "rms")
+  local reader = FileHandler.new("Daly hex log", "dalyhexlog", text, "rs")
   reader.read_open, reader.read, reader.seek_read = read_open, read, seek_read
   reader.extensions = "log;txt;hex"
   register_filehandler(reader)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -148,3 +149,19 @@ def test_damaged_logs_raise_nothing(tshark: Tshark) -> None:
             at = r.randrange(200, len(bad))
             bad[at : at + r.choice((0, 1, 3))] = r.randbytes(r.choice((0, 1, 3)))
         read(tshark, bytes(bad))
+
+
+@pytest.mark.timeout(60)
+def test_a_capture_from_a_pipe_shows_while_it_grows(tshark: Tshark) -> None:
+    """Our reader is asked only when the file is none that Wireshark knows: it would wait for the tenth line."""
+    sample = (ROOT / "pcap_samples/real-poll-cycle.pcapng").read_bytes()
+    end = 0
+    for _ in range(4):  # section, interface, two packets
+        end += int.from_bytes(sample[end + 4 : end + 8], "little")
+    process = tshark.start(["-l", "-r", "-"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+    with process:
+        assert process.stdin
+        assert process.stdout
+        process.stdin.write(sample[:end])
+        assert b"Request board 1" in process.stdout.readline()
+        process.stdin.close()
