@@ -66,7 +66,9 @@ class PcapWriter(CaptureWriter):
         seconds, rest = divmod(time_ns, 1_000_000_000)
         return struct.pack("<" + _RECORD, seconds, rest // self._unit, len(data), len(data)) + data
 
-    def write_statistics(self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int) -> None:
+    def write_statistics(
+        self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int, os_dropped: int = 0
+    ) -> None:
         """Do nothing: the format has no place for them."""
 
 

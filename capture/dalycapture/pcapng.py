@@ -60,7 +60,7 @@ END, COMMENT = 0, 1
 SHB_HARDWARE, SHB_OS, SHB_APPLICATION = 2, 3, 4
 IF_NAME, IF_DESCRIPTION, IF_SPEED, IF_TSRESOL, IF_TSOFFSET, IF_HARDWARE = 2, 3, 8, 9, 14, 15
 EPB_FLAGS, EPB_DROPCOUNT = 2, 4  # the obsolete block has its flags under the same code
-ISB_START, ISB_END, ISB_RECEIVED, ISB_DROPPED = 2, 3, 4, 5
+ISB_START, ISB_END, ISB_RECEIVED, ISB_DROPPED, ISB_OS_DROPPED = 2, 3, 4, 5, 7
 
 INBOUND: Final = 1
 OUTBOUND: Final = 2
@@ -143,13 +143,16 @@ class PcapngWriter(CaptureWriter):
         head = _PACKET.pack(interface, time_ns >> 32, time_ns & 0xFFFFFFFF, len(data), len(data))
         return _block(ENHANCED_PACKET, head + _padded(data) + options)
 
-    def write_statistics(self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int) -> None:
+    def write_statistics(
+        self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int, os_dropped: int = 0
+    ) -> None:
         """Write an Interface Statistics Block (its times are two 32-bit halves, the high one first)."""
         options = _options(
             _option(ISB_START, struct.pack("<II", start_ns >> 32, start_ns & 0xFFFFFFFF)),
             _option(ISB_END, struct.pack("<II", end_ns >> 32, end_ns & 0xFFFFFFFF)),
             _option(ISB_RECEIVED, struct.pack("<Q", received)),
             _option(ISB_DROPPED, struct.pack("<Q", dropped)),
+            _option(ISB_OS_DROPPED, struct.pack("<Q", os_dropped)) if os_dropped else b"",
         )
         head = _STATISTICS.pack(interface, end_ns >> 32, end_ns & 0xFFFFFFFF)
         self._write(_block(INTERFACE_STATISTICS, head + options))

@@ -37,12 +37,23 @@ class CaptureWriter(ABC):
     def _packet(self, time_ns: int, data: bytes, *, interface: int, flags: int, comment: str, dropped: int) -> bytes:
         """Lay out one packet."""
 
-    def write_packet(self, time_ns: int, data: bytes, *, interface: int = 0, flags: int = 0, comment: str = "") -> None:
+    def write_packet(
+        self,
+        time_ns: int,
+        data: bytes,
+        *,
+        interface: int = 0,
+        flags: int = 0,
+        comment: str = "",
+        dropped: int = 0,
+    ) -> None:
         """Write one packet; without bytes it is an event.
 
-        time_ns: nanoseconds since 1970 (UTC); flags: see pcapng's ``epb_flags``. Raises CaptureError, which says how
-        many records are safe and how many are lost, when the output broke; the output then ends in a whole block.
+        time_ns: nanoseconds since 1970 (UTC); flags: see pcapng's ``epb_flags``; dropped: what the port lost before it.
+        Raises CaptureError, which says how many records are safe and how many are lost, when the output broke; the
+        output then ends in a whole block.
         """
+        self._dropped += dropped
         block = self._packet(time_ns, data, interface=interface, flags=flags, comment=comment, dropped=self._dropped)
         records = 1 if data else 0
         if self._write(block, records):
@@ -53,8 +64,20 @@ class CaptureWriter(ABC):
             self._dropped += records
 
     @abstractmethod
-    def write_statistics(self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int) -> None:
-        """Write the interface's final counts, where the format has a place for them."""
+    def write_statistics(
+        self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int, os_dropped: int = 0
+    ) -> None:
+        """Write the interface's counts so far, where the format has a place for them.
+
+        received, dropped: records that came, and those that no file has; os_dropped: losses before us, in the kernel or
+        the UART.
+        """
+
+    def rotate(self) -> None:  # noqa: B027 - most have no next file
+        """Go on in the next file, where there is one: the user asks for it (SIGUSR1)."""
+
+    def tick(self) -> None:  # noqa: B027 - most do nothing by time
+        """Do what is due by time. Called about once a second, on a silent bus too."""
 
     def _write(self, block: bytes, records: int = 0) -> bool:
         try:

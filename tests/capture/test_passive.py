@@ -21,7 +21,8 @@ STRACE = shutil.which("strace")
 ALLOWED_CALLS = {"openat", "fstat", "newfstatat", "ioctl", "flock", "fcntl", "read", "close"}
 # TCGETS and TCSETS are termios, TIOCEXCL and TIOCNXCL exclusive use; nothing here moves a line or a byte.
 # isatty and termios of newer C libraries speak TCGETS2 and TCSETS2.
-ALLOWED_IOCTLS = {"TCGETS", "TCSETS", "TCGETS2", "TCSETS2", "TIOCEXCL", "TIOCNXCL"}
+# TIOCGICOUNT and TIOCMGET read error counters and modem lines: they ask the driver, not the bus.
+ALLOWED_IOCTLS = {"TCGETS", "TCSETS", "TCGETS2", "TCSETS2", "TIOCEXCL", "TIOCNXCL", "TIOCGICOUNT", "TIOCMGET"}
 
 
 def can_trace() -> bool:

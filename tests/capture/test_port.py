@@ -9,6 +9,7 @@ import re
 import select
 import socket
 import stat
+import struct
 import subprocess
 import sys
 import termios
@@ -17,9 +18,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from tests.capture.bus import Bus
 
-from dalycapture import port as module
+from dalycapture import device as module
 from dalycapture.errors import CaptureError, PortError
+from dalycapture.interface import tap_of
+from dalycapture.line import Counts, KernelLine, ModemState
 from dalycapture.port import Port, open_port, serial_ports
+from dalycapture.settings import ErrorMarks, Settings, line_format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -219,8 +223,10 @@ def test_pyserial_port_is_pumped(bus: Bus, monkeypatch: pytest.MonkeyPatch) -> N
     """What rfc2217 and Windows go through, with pyserial's own driver for a pty in its place."""
     import serial
 
-    def local(*_: object, **settings: Any) -> serial.Serial:
-        return serial.Serial(bus.port, **settings)
+    def local(*_: object, do_not_open: bool, **settings: Any) -> serial.Serial:
+        made = serial.Serial(None, **settings)  # a port that is named later is opened later
+        made.port = bus.port
+        return made
 
     monkeypatch.setattr(serial, "serial_for_url", local)
     port = open_port("rfc2217://somewhere:1")
@@ -230,3 +236,124 @@ def test_pyserial_port_is_pumped(bus: Bus, monkeypatch: pytest.MonkeyPatch) -> N
         got += wait_and_read(port)
     assert got == b"\xa5\x01\x90"
     port.close()
+
+
+class FakeLine:
+    """Answers as a driver of real hardware would; says what it was asked."""
+
+    def __init__(self, *, counts: Counts | None = Counts(), refuses: bool = False) -> None:  # noqa: B008 - a tuple
+        self.calls: list[str] = []
+        self._counts, self._refuses = counts, refuses
+        self._state = ModemState(rts=True, dtr=True)
+
+    def counts(self, _: int) -> Counts | None:
+        return self._counts
+
+    def modem_state(self, _: int) -> ModemState | None:
+        return self._state
+
+    def drop(self, _: int) -> bool:
+        self.calls.append("drop")
+        if not self._refuses:
+            self._state = ModemState(rts=False, dtr=False)
+        return not self._refuses
+
+    def low_latency(self, _: int) -> bool:
+        self.calls.append("low latency")
+        return not self._refuses
+
+
+def described(port: Port, settings: Settings) -> str:
+    return tap_of(port, settings).description
+
+
+def test_a_pseudo_terminal_knows_little_and_that_is_said(bus: Bus) -> None:
+    port = open_port(bus.port)
+    assert described(port, Settings()) == (
+        f"dalyshark bus=main 9600 8N1 {bus.port}; line errors not marked; no error counters; "
+        "RTS and DTR not known (leave); bytes held back for up to 0 ms (pseudo-terminal)"
+    )
+    port.close()
+
+
+def test_what_was_asked_and_granted_is_in_the_description(bus: Bus) -> None:
+    settings = Settings(4800, "8E1", modem_lines="drop", low_latency=True, latency_ms=2)
+    line = FakeLine()
+    port = open_port(bus.port, settings, line=line)
+    assert line.calls == ["drop", "low latency"]  # the bus is freed first
+    # A pseudo-terminal has no parity (capture notes, section 4): what was asked is not what was granted.
+    assert described(port, settings) == (
+        f"dalyshark bus=main 4800 8E1 {bus.port}; asked 8E1, granted 8N1; low latency granted; line errors marked; "
+        "RTS off, DTR off (drop); bytes held back for up to 2 ms (as given)"
+    )
+    port.close()
+
+
+def test_what_was_refused_is_said_too(bus: Bus) -> None:
+    settings = Settings(modem_lines="drop", low_latency=True, error_marks="off")
+    port = open_port(bus.port, settings, line=FakeLine(counts=None, refuses=True))
+    assert port.facts.remarks == (
+        "RTS and DTR could not be dropped",
+        "low latency refused",
+        "line errors not marked",
+        "no error counters",
+        "RTS on, DTR on (drop)",
+    )
+    port.close()
+
+
+def test_lines_are_left_alone_unless_asked(bus: Bus) -> None:
+    line = FakeLine()
+    port = open_port(bus.port, line=line)
+    assert line.calls == []
+    assert "RTS on, DTR on (leave)" in port.facts.remarks
+    port.close()
+
+
+@pytest.mark.parametrize(("marks", "counts", "marked"), [
+    ("auto", Counts(), True), ("auto", None, False), ("on", None, True), ("off", Counts(), False),
+])  # fmt: skip
+def test_errors_are_marked_where_the_driver_counts_them(
+    bus: Bus, marks: ErrorMarks, counts: Counts | None, marked: bool
+) -> None:
+    port = open_port(bus.port, Settings(error_marks=marks), line=FakeLine(counts=counts))
+    slave = os.open(bus.port, os.O_RDONLY | os.O_NOCTTY) if os.geteuid() == 0 else port.fileno()
+    wanted = termios.PARMRK | termios.INPCK if marked else 0
+    assert termios.tcgetattr(slave)[0] == wanted
+    assert port.facts.marked is marked
+    if marked:  # then the kernel doubles every good FF (capture notes, section 2)
+        bus.send(b"\xa5\xff\x00")
+        assert wait_and_read(port) == b"\xa5\xff\xff\x00"
+    if slave != port.fileno():
+        os.close(slave)
+    port.close()
+
+
+def test_counters_of_the_kernel_s_struct() -> None:
+    """struct serial_icounter_struct: cts dsr rng dcd rx tx frame overrun parity brk buf_overrun, nine reserved."""
+    import fcntl
+
+    def answer(fd: int, request: int, buffer: bytearray) -> int:
+        assert request == 0x545D
+        buffer[:] = struct.pack("20i", 1, 2, 3, 4, 500, 6, 7, 8, 9, 10, 11, *[0] * 9)
+        return 0
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fcntl, "ioctl", answer)
+        assert KernelLine().counts(0) == Counts(rx=500, frame=7, overrun=8, parity=9, breaks=10, buf_overrun=11)
+
+
+def test_counters_wrap() -> None:
+    assert Counts(rx=3, frame=1).since(Counts(rx=0x7FFFFFFF, frame=1)) == Counts(rx=0x80000004)
+    assert str(Counts(rx=9, frame=2, overrun=1)) == "2 framing errors, 1 overruns"
+
+
+@pytest.mark.parametrize(("text", "bits"), [("8N1", 10), ("8e1", 11), ("7O1", 10), ("8N2", 11)])
+def test_formats(text: str, bits: int) -> None:
+    assert Settings(line_format=line_format(text)).bits_per_byte == bits
+
+
+@pytest.mark.parametrize("text", ["8N", "9N1", "8M1", "8N1.5", "", "8N11"])
+def test_formats_that_are_none(text: str) -> None:
+    with pytest.raises(PortError, match="is not known; Daly's is 8N1"):
+        line_format(text)

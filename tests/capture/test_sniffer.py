@@ -15,11 +15,12 @@ from tests.capture.bus import Bus, numbered, real_uart_frames
 
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.interface import tap
+from dalycapture.interface import tap, tap_of
 from dalycapture.output import PipeOutput
 from dalycapture.pcapng import PcapngWriter
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
+from dalycapture.settings import Settings
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalycapture.waiting import Waiter
 from dalyref.kinds import Kind
@@ -90,7 +91,7 @@ def sniffing(
     limits: Limits | None = None,
     listener: Callable[[TimedRecord], None] | None = None,
 ) -> Generator[Running]:
-    running = Running(Sniffer(port, tap(port.name), sinks, limits=limits, listener=listener))
+    running = Running(Sniffer(port, tap_of(port, Settings()), sinks, limits=limits, listener=listener))
     try:
         yield running
     finally:
@@ -122,7 +123,7 @@ def test_what_was_sent_is_in_the_file(bus: Bus, port: Port, tmp_path: Path) -> N
     tally = running.sniffer.tally
     assert (tally.records, tally.bytes, tally.end) == (len(parts), len(stream), End.STOPPED)
     assert (tally.good, tally.bad, tally.kinds[Kind.JUNK]) == (len(parts) - 3, 2, 1)
-    assert packets[0].description == f"dalyshark bus=main 9600 8N1 {bus.port}"
+    assert packets[0].description.startswith(f"dalyshark bus=main 9600 8N1 {bus.port}; ")
     assert bus.heard() == b""
 
 

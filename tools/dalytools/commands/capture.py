@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING
 
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.interface import bus_name, tap
+from dalycapture.interface import bus_name, tap_of
 from dalycapture.linktype import DEFAULT_LINK_TYPE, check_link_type
 from dalycapture.port import open_port
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalycapture.writer import counted
 from dalyref.kinds import Kind
 from dalytools import __version__
+from dalytools.adapter_list import list_adapters
+from dalytools.port_options import PORT_HELP, add_port_options, checked, settings_of
 from dalytools.problem import Problem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from dalycapture.framing import TimedRecord
 
 STATUS_EVERY_S = 0.25
@@ -34,8 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Listen to a serial port and write every record to a capture file. Ctrl-C ends it. Nothing is sent to the bus."
     )
-    parser.add_argument("port", metavar="PORT", help="device, socket://HOST:PORT or rfc2217://HOST:PORT")
-    parser.add_argument("-w", dest="output", metavar="FILE", required=True, help="capture file; - is standard output")
+    parser.add_argument("port", metavar="PORT", nargs="?", help=PORT_HELP)
+    parser.add_argument("--list", action="store_true", help="list the serial adapters, without opening any, and end")
+    parser.add_argument("-w", dest="output", metavar="FILE", help="capture file; - is standard output")
     parser.add_argument(
         "-a",
         dest="limits",
@@ -46,8 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="stop after duration:SECONDS, packets:N or filesize:KB (1000 bytes); may be given more than once",
     )
     parser.add_argument("-c", dest="packets", metavar="N", type=_positive, help="stop after N records")
-    parser.add_argument("--baud", type=_positive, default=9600, help="bits per second (default: %(default)s)")
-    parser.add_argument("--bus", type=_checked(bus_name), default="main", help="name of the bus (default: %(default)s)")
+    parser.add_argument("--bus", type=checked(bus_name), default="main", help="name of the bus (default: %(default)s)")
     parser.add_argument(
         "-F",
         dest="file_format",
@@ -64,10 +64,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="147, 148 or 150..162 (default: %(default)s); 149 is taken by another dissector in Wireshark",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="no status line and no summary")
+    add_port_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Capture until Ctrl-C, SIGTERM, a limit or the end of the port."""
+    if args.list:
+        return list_adapters()
+    if not args.port:
+        raise Problem("say which PORT to listen to; dalyshark capture --list shows what is there")
+    if not args.output:
+        raise Problem("say where the capture goes: -w FILE, or -w - for standard output")
     limits = Limits()
     for name, value in args.limits:
         limits = replace(limits, **{name: value})
@@ -89,9 +96,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _capture(args: argparse.Namespace, limits: Limits, status: _Status | None) -> Tally:
-    port = open_port(args.port, args.baud)
+    settings = settings_of(args)
+    port = open_port(args.port, settings)
     try:
-        interface = tap(args.port, bus=args.bus, baud=args.baud, link_type=args.link_type, hardware=port.hardware)
+        interface = tap_of(port, settings, bus=args.bus, link_type=args.link_type)
         # After the port: a wrong port does not cost an older capture of the same name.
         sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}")
         sniffer = Sniffer(port, interface, [sink], limits=limits, listener=status)
@@ -185,13 +193,3 @@ def _link_type(text: str) -> int:
         return check_link_type(number)
     except CaptureError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _checked(check: Callable[[str], str]) -> Callable[[str], str]:
-    def checked(text: str) -> str:
-        try:
-            return check(text)
-        except CaptureError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-
-    return checked

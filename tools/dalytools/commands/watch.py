@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.interface import bus_name, tap
+from dalycapture.interface import bus_name, tap_of
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
@@ -31,6 +31,7 @@ from dalytools import __version__
 from dalytools.commands.check import SHOWN
 from dalytools.comparison import compare
 from dalytools.live_view import LiveView
+from dalytools.port_options import PORT_HELP, add_port_options, settings_of
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.summary import Summary
@@ -67,12 +68,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Ctrl-C ends it. Nothing is sent to the bus. Without PORT: a simulated bus, for 20 s."
     )
     parser.epilog = "Exit status: 0 fine, 1 the two decoders differ, 2 could not run or the port was lost."
-    parser.add_argument("port", metavar="PORT", nargs="?", help="device, socket://HOST:PORT or rfc2217://HOST:PORT")
+    parser.add_argument("port", metavar="PORT", nargs="?", help=PORT_HELP)
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file (default: captures/daly-TIME.pcapng)")
     parser.add_argument("--duration", type=_seconds, metavar="S", help="stop after so many seconds")
-    parser.add_argument("--baud", type=_baud, default=9600, help="bits per second (default: %(default)s)")
     parser.add_argument("--bus", default="main", help="name of the bus (default: %(default)s)")
     parser.add_argument("-q", "--quiet", action="store_true", help="do not show records, only the summary")
+    add_port_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -148,10 +149,11 @@ def _output(asked: str | None) -> Path:
 def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path, bus: SimulatedBus | None) -> Tally:
     duration: float | None = args.duration
     port_name: str = bus.tap if bus else args.port
-    port = open_port(port_name, args.baud)
+    settings = settings_of(args)
+    port = open_port(port_name, settings)
     with contextlib.ExitStack() as stack:
         stack.callback(port.close)
-        interface = tap(port_name, bus=args.bus, baud=args.baud, hardware=port.hardware)
+        interface = tap_of(port, settings, bus=args.bus)
         if not args.output:
             _make_folder(path.parent)
         sinks = [open_writer(path, application=APPLICATION)]
@@ -274,13 +276,6 @@ def _checked(tshark: Tshark, path: Path, options: Options) -> int:
     if result.broken:
         raise Problem(f"the check broke off: {result.broken}; the capture is in {path}")
     return result.found
-
-
-def _baud(text: str) -> int:
-    if not text.isascii() or not text.isdecimal() or not 0 < int(text[:9]) <= 10**8:
-        message = f"{text!r} is not a baud rate, such as 9600"
-        raise argparse.ArgumentTypeError(message)
-    return int(text)
 
 
 def _seconds(text: str) -> float:
