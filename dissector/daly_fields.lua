@@ -6,6 +6,7 @@
 
 local faults = require("daly_faults")
 local data_ids = require("daly_data_ids")
+local types = require("daly_field_types")
 
 local M = {}
 
@@ -15,23 +16,12 @@ local DIRECTION = { [1] = "Request", [2] = "Reply", [3] = "Echo" }
 local CHECKSUM = { [0] = "Bad", [1] = "Good", [2] = "Unverified" }
 local STATE = { [0] = "stationary", [1] = "charging", [2] = "discharging" }
 local CHARGER = { [0] = "disconnected", [1] = "connected" }
-local FUNCTION = {
-  [0x03] = "Read registers",
-  [0x06] = "Write one register",
-  [0x10] = "Write registers",
-  [0x83] = "Exception to a read",
-  [0x86] = "Exception to a write of one",
-  [0x90] = "Exception to a write",
-}
 
 M.STATE = STATE
 
-local fields = {} -- by short name
-local list = {} -- as Wireshark wants them
-
 -- How sure each is, behind its description in brackets: "documented" in the vendor's paper V1.2, "generated" by us, and, where
 -- the field notes know more or otherwise:
-local SURE = {
+for name, word in pairs({
   ["daly.address"] = "documented; more host addresses are seen by several",
   ["daly.pack.gather_voltage"] = "documented; 0 on every device seen",
   ["daly.pack.current"] = "documented; its sign is contradicted",
@@ -53,85 +43,23 @@ local SURE = {
   ["daly.serial_number"] = "seen once",
   ["daly.reserved"] = "seen by several",
   ["daly.undecoded"] = "as on the wire",
-  ["daly.modbus.address"] = "seen by several",
-}
-
-local function sure(abbreviation, description)
-  local word = SURE[abbreviation]
-    or description:find("generated", 1, true) and "generated"
-    or (description:find("V1.2", 1, true) or description:find("vendor's article", 1, true)) and "documented"
-  return word and description .. " [" .. word .. "]" or description
+}) do
+  types.SURE[name] = word
 end
 
-local function add(short, abbreviation, make)
-  local field = make("daly." .. abbreviation)
-  fields[short] = field
-  list[#list + 1] = field
-end
-
-local function plain(make, name, description)
-  return function(abbreviation)
-    return make(abbreviation, name, base.DEC, nil, nil, sure(abbreviation, description))
-  end
-end
-
-local function hex(make, name, description, values)
-  return function(abbreviation)
-    return make(abbreviation, name, base.HEX, values, nil, sure(abbreviation, description))
-  end
-end
-
-local function number(name, description)
-  return plain(ProtoField.uint8, name, description)
-end
-
-local function named(name, values, description)
-  return function(abbreviation)
-    return ProtoField.uint8(abbreviation, name, base.DEC, values, nil, sure(abbreviation, description))
-  end
-end
-
-local function double(name, description)
-  return function(abbreviation)
-    -- The short constructor's arguments differ between versions.
-    return ProtoField.new(name, abbreviation, ftypes.DOUBLE, nil, base.NONE, nil, sure(abbreviation, description))
-  end
-end
-
-local function text(name, description)
-  return function(abbreviation)
-    return ProtoField.new(name, abbreviation, ftypes.STRING, nil, base.NONE, nil, sure(abbreviation, description))
-  end
-end
-
-local function bytes(name, description)
-  return function(abbreviation)
-    return ProtoField.bytes(abbreviation, name, base.NONE, sure(abbreviation, description))
-  end
-end
-
-local function boolean(name, description)
-  return function(abbreviation)
-    return ProtoField.bool(abbreviation, name, base.NONE, nil, nil, sure(abbreviation, description))
-  end
-end
-
-local function packet(name, kind, description)
-  return function(abbreviation)
-    return ProtoField.framenum(abbreviation, name, base.NONE, kind, nil, sure(abbreviation, description))
-  end
-end
-
+local declared = types.new()
+local add, plain, hex, number, named = declared.add, types.plain, types.hex, types.number, types.named
+local double, text, bytes, boolean, packet = types.double, types.text, types.bytes, types.boolean, types.packet
 local u16, u32 = ProtoField.uint16, ProtoField.uint32
 
 -- stylua: ignore start
 
 -- Every record.
 add("kind",           "kind",             text("Record",         "What the record is: frame, bad_checksum, short, junk, foreign, event; generated (docs/records.md)"))
-add("transport",      "transport",        text("Transport",      "The medium: uart, tcp; generated"))
-add("dialect",        "dialect",          text("Dialect",        "a5, d2 or 81: which of Daly's protocols; generated"))
+add("transport",      "transport",        text("Transport",      "The medium: uart, can, ble, tcp; generated"))
+add("dialect",        "dialect",          text("Dialect",        "a5 (also on CAN), hkms, d2 or 81: which of Daly's protocols; generated"))
 add("undecoded",      "undecoded",        bytes("Bytes",         "Bytes that are shown as they are"))
-add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, or Sinowealth with right CRC-8; generated"))
+add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, Sinowealth with right CRC-8, other frames on a CAN bus, the Bluetooth module's own; generated (docs/wires.md)"))
 add("continued_in",   "continued_in",     packet("Continued in", frametype.NONE, "Packet in which the record that begins here ends; generated"))
 add("began_in",       "began_in",         packet("Began in",     frametype.NONE, "Packet in which this record began; generated"))
 
@@ -139,6 +67,7 @@ add("began_in",       "began_in",         packet("Began in",     frametype.NONE,
 add("start",          "start",            hex(ProtoField.uint8, "Start flag", "A5, fixed; V1.2 2.3"))
 add("address",        "address",          hex(ProtoField.uint8, "Address",    "Request: who asks, 40 PC, 80 Bluetooth app, 20 GPRS, 41..4F PC to board 2..16; reply: board number; V1.2 2.2, field notes fact 3"))
 add("data_id",        "data_id",          hex(ProtoField.uint8, "Data ID",    "What is asked or answered; V1.2 section 3", data_ids))
+add("unknown_id",     "unknown_id",       boolean("Unknown data ID", "The data ID stands in no paper and no field note: its bytes are shown as they are; generated (docs/protocol.md)"))
 add("length",         "length",           plain(ProtoField.uint8, "Data length", "Bytes of data, always 8; V1.2 2.3"))
 add("data",           "data",             bytes("Data",          "The eight data bytes; V1.2 2.3"))
 add("checksum",       "checksum",         hex(ProtoField.uint8, "Checksum",   "Low byte of the sum of all bytes before; V1.2 2.3 note 2"))
@@ -255,21 +184,18 @@ add("fault_cleared",  "fault_cleared",    text("Cleared",                    "Na
 -- What changed since the record before of this kind, and what contradicts another; docs/records.md 9, 11.
 add("changed",        "changed",          text("Changed",                    "What changed since the last 0x93 or 0x94 of this board: state, charge_mos, discharge_mos, cell_count, sensor_count, charger, load; generated"))
 add("changed_from",   "changed_from",     packet("Changed since", frametype.NONE, "Packet of the record before of this kind of this board; generated"))
-add("contradiction",  "contradiction",    text("Contradiction",              "What this record says otherwise than another of this board: pack_voltage, cell_max, cell_min, cell_number, temperature_max, temperature_min, sensor_number; generated"))
+add("contradiction",  "contradiction",    text("Contradiction",              "What this record says otherwise than another of this board: pack_voltage, cell_max, cell_min, cell_number, temperature_max, temperature_min, sensor_number, soc; generated"))
 add("contradicts",    "contradicts",      packet("Contradicts", frametype.NONE, "Packet of that other record; generated"))
 
 add("reserved",       "reserved",         bytes("Reserved",                  "Reserved bytes and slots of no cell: stale bytes on many boards (field notes fact 2)"))
 
--- Modbus RTU; what its registers mean is not decoded yet.
-add("modbus_address", "modbus.address",   hex(ProtoField.uint8, "Modbus address", "D2 both ways; 80+N request, 50+N reply of board N; field notes fact 8"))
-add("modbus_function", "modbus.function", hex(ProtoField.uint8, "Function",  "03, 06, 10; exceptions 83, 86, 90; vendor's article of 2024, section 3", FUNCTION))
-add("modbus_crc",     "modbus.crc",       hex(u16, "CRC",                    "CRC-16, low byte first; vendor's article of 2024, section 3"))
-add("modbus_crc_status", "modbus.crc.status", named("CRC status", CHECKSUM,  "0 Bad, 1 Good, 2 Unverified; generated"))
-
 -- stylua: ignore end
 
-M.fields = fields
-M.list = list
+require("daly_fields_settings").declare(add)
+require("daly_fields_wires").declare(add)
+
+M.fields = declared.fields
+M.list = declared.list
 
 -- stylua: ignore
 M.experts = {
