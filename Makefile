@@ -34,7 +34,7 @@ matrix: ## the dissector's tests in several versions of Wireshark; make matrix A
 	$(DEV_SETUP)
 	@$(PY) tests/matrix/run.py $(ARGS)
 
-soak: ## a million records, good and damaged, through both readings
+soak: ## a million records, good and damaged, through both readings, in every Wireshark that is there
 	$(DEV_SETUP)
 	@$(PY) -m bench.soak $(ARGS)
 

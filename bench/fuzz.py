@@ -10,7 +10,6 @@ No Lua error, no abort, no hang may come of it. The tsharks: this machine's own,
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import subprocess
 import sys
@@ -19,13 +18,16 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bench import wiresharks
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
 from dalycapture.reader import read_capture
-from dalytools.tshark import Tshark, lua_complaint
+from dalytools.tshark import lua_complaint
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from dalytools.tshark import Tshark
 
 ROOT = Path(__file__).resolve().parents[1]
 SAMPLES = sorted(ROOT.joinpath("pcap_samples").glob("*.pcap*"))
@@ -130,12 +132,6 @@ def look(tshark: Tshark, path: Path, way: tuple[str, ...]) -> str:
     return ""
 
 
-def members() -> list[str]:
-    """Every tshark there is: this machine's own (empty), and the fetched ones."""
-    fetched = sorted(path for path in ROOT.joinpath(".cache", "wireshark").glob("*/tshark") if os.access(path, os.X_OK))
-    return ["", *map(str, fetched)]
-
-
 def fuzz(tshark: Tshark, count: int, seed: int) -> list[str]:
     """Read `count` mutated packets. Return what was wrong."""
     wrong: list[str] = []
@@ -180,16 +176,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same packets (%(default)s)")
     options = parser.parse_args()
     found = 0
-    for member in members():
-        if member:
-            os.environ["DALYSHARK_TSHARK"] = member
+    for tshark in wiresharks.each():
         began = time.monotonic()
-        with Tshark() as tshark:
-            wrong = fuzz(tshark, options.packets, options.seed)
-            seconds = time.monotonic() - began
-            sys.stdout.write(
-                f"tshark {tshark.version}: {options.packets} packets, {seconds:.0f} s, {len(wrong)} files with errors\n"
-            )
+        wrong = fuzz(tshark, options.packets, options.seed)
+        seconds = time.monotonic() - began
+        sys.stdout.write(
+            f"tshark {tshark.version}: {options.packets} packets, {seconds:.0f} s, {len(wrong)} files with errors\n"
+        )
         for line in wrong:
             sys.stdout.write(f"  {line}\n")
         found += len(wrong)

@@ -2,7 +2,7 @@
 """``make soak``: a million records, good and damaged, through both readings; none may differ.
 
 Half of them a bus as it could be (the simulator, with damage), half of them trouble (tests/traffic.py), in captures of
-50,000 packets each.
+50,000 packets each. In every Wireshark there is: this machine's own, and those that ``make matrix`` fetched.
 """
 
 from __future__ import annotations
@@ -17,15 +17,17 @@ from typing import TYPE_CHECKING
 
 from tests.traffic import DESCRIPTIONS, EPOCH_NS, Made, Traffic
 
+from bench import wiresharks
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
 from dalytools.comparison import compare
 from dalytools.simulator.bus import traffic
 from dalytools.simulator.scenario import Board, Damage, Host, Pack, Scenario
-from dalytools.tshark import Tshark
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from dalytools.tshark import Tshark
 
 PACKETS_A_FILE = 50_000
 
@@ -56,17 +58,12 @@ def write(path: Path, packets: Iterator[Made]) -> None:
             writer.write_packet(packet.time_ns, packet.data, interface=packet.interface, flags=packet.direction)
 
 
-def main() -> int:
-    """Compare file after file until there are enough records. Return 1 when anything differed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", type=int, default=1_000_000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, help="keep captures that differ in this folder")
-    args = parser.parse_args()
+def soak(tshark: Tshark, args: argparse.Namespace) -> int:
+    """Compare file after file until there are enough records. Return how many differences there were."""
     records = found = packets = 0
     kinds: dict[str, int] = {}
     started = time.monotonic()
-    with Tshark() as tshark, tempfile.TemporaryDirectory(prefix="dalyshark-soak-") as folder:
+    with tempfile.TemporaryDirectory(prefix="dalyshark-soak-") as folder:
         for seed in itertools.count(args.seed):
             if records >= args.records:
                 break
@@ -86,12 +83,23 @@ def main() -> int:
                 args.keep.mkdir(parents=True, exist_ok=True)
                 (args.keep / path.name).write_bytes(path.read_bytes())
             path.unlink()
-        told = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
-        print(
-            f"{records} records ({told}) in {packets} packets, tshark {tshark.version}, "
-            f"{time.monotonic() - started:.0f} s: {found} differences"
-        )
-    return 1 if found else 0
+    told = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    print(
+        f"tshark {tshark.version}: {records} records ({told}) in {packets} packets, "
+        f"{time.monotonic() - started:.0f} s: {found} differences",
+        flush=True,
+    )
+    return found
+
+
+def main() -> int:
+    """Soak in every Wireshark there is. Return 1 when anything differed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--records", type=int, default=1_000_000, help="records a Wireshark (%(default)s)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", type=Path, help="keep captures that differ in this folder")
+    args = parser.parse_args()
+    return 1 if sum(soak(tshark, args) for tshark in wiresharks.each()) else 0
 
 
 if __name__ == "__main__":
