@@ -4,28 +4,50 @@
 from __future__ import annotations
 
 import platform
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from dalycapture.output import open_output
+from dalycapture.errors import CaptureError
+from dalycapture.output import open_output, open_pipe
 from dalycapture.pcap import PcapWriter
 from dalycapture.pcapng import PcapngWriter
+from dalycapture.rotation import FileSeries, Keeping, Rotation
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from dalycapture.output import Output
     from dalycapture.writer import CaptureWriter
 
 
 def open_writer(
-    path: Path | str, file_format: Literal["pcapng", "pcap"] = "pcapng", *, application: str = "dalyshark"
+    path: Path | str,
+    file_format: Literal["pcapng", "pcap"] = "pcapng",
+    *,
+    application: str = "dalyshark",
+    keeping: Keeping | None = None,
 ) -> CaptureWriter:
     """Make a capture file; ``-`` is standard output. An older capture of that name is overwritten, nothing else is.
 
     Its header is written with the first interface.
-    application: name and version of the program, for the file. Raises CaptureError.
+    application: name and version of the program, for the file; keeping: in what form files are kept. Raises
+    CaptureError.
     """
-    output = open_output(path)
+    keeping = keeping or Keeping()
+    output = _output(path, file_format, keeping)
     if file_format == "pcap":
-        return PcapWriter(output)
-    system = f"{platform.system()} {platform.release()}"
-    return PcapngWriter(output, application=application, hardware=platform.machine(), os_name=system)
+        return PcapWriter(output, wait_when_full=keeping.wait_when_full)
+    return PcapngWriter(
+        output,
+        application=application,
+        hardware=platform.machine(),
+        os_name=f"{platform.system()} {platform.release()}",
+        wait_when_full=keeping.wait_when_full,
+    )
+
+
+def _output(path: Path | str, file_format: str, keeping: Keeping) -> Output:
+    direct = open_output(path) if str(path) == "-" else open_pipe(path)
+    if direct is None:
+        return FileSeries(Path(path), keeping, file_format)
+    if keeping.append or keeping.checksum or keeping.rotation != Rotation():
+        raise CaptureError(f"{direct.name} is no file: --append, --sha256 and -b have no meaning for it")
+    return direct

@@ -12,15 +12,24 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import os
 import select
 import stat
 import sys
 import time
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
+from dalycapture.checksum import checksum_path, write_checksum
+from dalycapture.disk import DiskThread
 from dalycapture.errors import CaptureError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from hashlib import _Hash as Hasher  # pyright: ignore[reportPrivateUsage]
+
+    from dalycapture.torn import Whole
 
 CAPTURE_MAGICS = frozenset(
     bytes.fromhex(text) for text in ("0a0d0d0a", "a1b2c3d4", "d4c3b2a1", "a1b23c4d", "4d3cb2a1", "a1b2cd34", "34cdb2a1")
@@ -35,8 +44,15 @@ GOODBYE_S = 2.0  # how long closing waits for the reader of a pipe
 class Output(Protocol):
     """Takes whole blocks."""
 
-    name: str
-    size: int  # bytes taken so far
+    @property
+    def name(self) -> str:
+        """What to call it."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Bytes taken so far."""
+        ...
 
     def write(self, block: bytes) -> bool:
         """Take a block; False: it had to be dropped, though the output lives. Raises OSError when it is broken."""
@@ -52,14 +68,36 @@ class Output(Protocol):
 
 
 class FileOutput:
-    """A regular file. The file keeps its last whole block, whatever happens."""
+    """A regular file. The file keeps its last whole block, whatever happens.
 
-    def __init__(self, fd: int, name: str) -> None:
+    sync_s: seconds between two syncs to the disk, 0: never. path, hasher: where and by what its checksum is to be left
+    when it is closed. told: called then with its name. appended: what was there before, where it is gone on with.
+    """
+
+    def __init__(
+        self,
+        fd: int,
+        name: str,
+        *,
+        path: Path | None = None,
+        sync_s: float = 0.0,
+        hasher: Hasher | None = None,
+        told: Callable[[str], None] | None = None,
+        appended: Whole | None = None,
+    ) -> None:
         self.name = name
         self.size = 0
+        self.path = path
+        self.appended = appended
+        self.notes: list[str] = []  # what went wrong at its end
+        self.closed = False
         self._fd = fd
+        self._hasher = hasher
+        self._told = told
+        self._after: FileOutput | None = None
         appending = _is_appending(fd)
         self._start = os.fstat(fd).st_size if appending else os.lseek(fd, 0, os.SEEK_CUR)
+        self._disk = DiskThread(fd, path, sync_s, self._at_end)
 
     def write(self, block: bytes) -> bool:
         """Write one block. Raises OSError after the file was cut back to the block before."""
@@ -75,14 +113,48 @@ class FileOutput:
                 os.lseek(self._fd, end, os.SEEK_SET)
             raise
         self.size += done
+        if self._hasher:
+            self._hasher.update(block)
+        self._disk.dirty()
         return True
 
     def pump(self) -> None:
-        """Do nothing: a file takes all at once."""
+        """Raise OSError where the disk refused what it had seemed to take."""
+        if self._disk.problem:
+            raise self._disk.problem
+
+    def sync_soon(self) -> None:
+        """Have what was written on the disk as soon as it can."""
+        self._disk.sync_soon()
+
+    def end(self, after: FileOutput | None = None) -> None:
+        """Close the file without waiting for the disk; ``join`` does. after: its name is to be told before ours."""
+        self._after = after
+        self._disk.end()
+
+    def join(self) -> None:
+        """Wait until the file is closed; ``notes`` then says what went wrong."""
+        self._disk.join()
 
     def close(self) -> None:
-        """Close the file."""
-        os.close(self._fd)
+        """Close the file, and wait for it."""
+        self.end()
+        self.join()
+
+    def _at_end(self) -> None:
+        if self._disk.problem:
+            self.notes.append(f"{self.name}: {reason(self._disk.problem)} when it was closed; its end may be missing")
+        elif self._hasher and self.path:
+            try:
+                write_checksum(self.path, self._hasher.hexdigest())
+            except OSError as error:
+                self.notes.append(f"{self.name} has no checksum file: {reason(error)}")
+        if self._after:
+            self._after.join()
+            self._after = None
+        if self._told:
+            self._told(self.name)
+        self.closed = True
 
 
 class PipeOutput:
@@ -147,24 +219,77 @@ def open_output(path: Path | str) -> FileOutput | PipeOutput:
     """
     if str(path) == "-":
         return _standard_output()
-    name = str(path)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | os.O_APPEND | getattr(os, "O_NOCTTY", 0)
+    return open_pipe(path) or open_file(Path(path))
+
+
+def open_pipe(path: Path | str) -> PipeOutput | None:
+    """Open what is there and is no regular file (a FIFO, a device); else None. Raises CaptureError."""
     try:
-        before = _kind_of(Path(path))
-        if before is not None and not stat.S_ISREG(before):
-            return PipeOutput(os.open(path, os.O_WRONLY | os.O_CLOEXEC | os.O_NOCTTY), name)
-        if before is not None:
-            _refuse_other_files(Path(path))
-        fd = os.open(path, flags, 0o666)
+        kind = _kind_of(Path(path))
+        if kind is None or stat.S_ISREG(kind):
+            return None
+        return PipeOutput(os.open(path, os.O_WRONLY | os.O_CLOEXEC | os.O_NOCTTY), str(path))
+    except OSError as error:
+        raise CaptureError(_cannot_write(path, error)) from None
+
+
+def open_file(
+    path: Path,
+    *,
+    file_format: str = "pcapng",
+    append: bool = False,
+    new: bool = False,
+    sync_s: float = 0.0,
+    checksum: bool = False,
+    told: Callable[[str], None] | None = None,
+) -> FileOutput:
+    """Open a regular file to write a capture. Raises CaptureError.
+
+    append: go on behind what is whole of the capture of this format that is there; new: only if nothing is there. The
+    rest is told in FileOutput.
+    """
+    name = str(path)
+    flags = (os.O_RDWR if append else os.O_WRONLY) | os.O_CREAT | os.O_CLOEXEC | os.O_APPEND
+    try:
+        if not new and not append and path.exists():
+            _refuse_other_files(path)
+        fd = os.open(path, flags | (os.O_EXCL if new else 0) | getattr(os, "O_NOCTTY", 0), 0o666)
     except OSError as error:
         raise CaptureError(_cannot_write(path, error)) from None
     try:
         _own(fd, name)
-        os.ftruncate(fd, 0)
-        return FileOutput(fd, name)
+        hasher = hashlib.sha256() if checksum else None
+        appended = _whole(fd, name, file_format, hasher) if append else None
+        os.ftruncate(fd, appended.end if appended else 0)
+        if checksum:
+            checksum_path(path).unlink(missing_ok=True)  # that of what was there; ours comes when all is whole
+        return FileOutput(fd, name, path=path, sync_s=sync_s, hasher=hasher, told=told, appended=appended)
+    except OSError as error:
+        os.close(fd)
+        raise CaptureError(_cannot_write(path, error)) from None
     except BaseException:
         os.close(fd)
         raise
+
+
+def _whole(fd: int, name: str, file_format: str, hasher: Hasher | None) -> Whole | None:
+    """Find what is whole of the capture that is there, and begin its checksum; None: there is nothing."""
+    from dalycapture.torn import find_end
+
+    size = os.fstat(fd).st_size
+    if not size:
+        return None
+    with os.fdopen(os.dup(fd), "rb", buffering=0) as file:
+        whole = find_end(file, name, size)
+        if whole.file_format not in {file_format, ""}:
+            raise CaptureError(f"{name} is {whole.file_format}, and {file_format} can not follow it; use another name")
+        if hasher:
+            file.seek(0)
+            left = whole.end
+            while left and (piece := file.read(min(left, 1 << 20))):
+                hasher.update(piece)
+                left -= len(piece)
+    return whole
 
 
 def _standard_output() -> FileOutput | PipeOutput:
@@ -203,6 +328,8 @@ def _cannot_write(path: Path | str, error: OSError) -> str:
     folder = Path(path).parent
     if isinstance(error, IsADirectoryError):
         return f"{path} is a directory; give the name of a file in it"
+    if isinstance(error, FileExistsError):
+        return f"{path} is there already; wait a second, or write elsewhere"
     if isinstance(error, FileNotFoundError):
         return f"there is no directory {folder} for {Path(path).name}; make it first, or write elsewhere"
     if isinstance(error, PermissionError):

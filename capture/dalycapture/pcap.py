@@ -39,30 +39,41 @@ _RECORD = "IIII"
 class PcapWriter(CaptureWriter):
     """Writes classic pcap, little-endian, one packet a write."""
 
-    def __init__(self, output: Output, *, nanoseconds: bool = True) -> None:
-        super().__init__(output)
+    def __init__(self, output: Output, *, nanoseconds: bool = True, wait_when_full: bool = False) -> None:
+        super().__init__(output, wait_when_full=wait_when_full)
         self._magic = NANOSECONDS if nanoseconds else MICROSECONDS
         self._unit = 1 if nanoseconds else 1000
         self._link_type: int | None = None
 
-    def add_interface(self, interface: Interface) -> int:
-        """Write the file header, at the first interface; others must be of the same link type."""
-        if self._link_type is None:
-            header = struct.pack("<" + _HEADER, self._magic, 2, 4, 0, 0, SNAP_LENGTH, interface.link_type)
-            self._write(header)
-            self._link_type = interface.link_type
-        elif self._link_type != interface.link_type:
+    def _introduction(self, interface: Interface, *, first: bool) -> list[bytes]:
+        """Lay out the file header, at the first interface; others must be of the same link type."""
+        if self._link_type not in {None, interface.link_type}:
             message = (
-                f"classic pcap holds one link type, not both {link_type_name(self._link_type)} and "
+                f"classic pcap holds one link type, not both {link_type_name(self._link_type or 0)} and "
                 f"{link_type_name(interface.link_type)}; write pcapng"
             )
             raise CaptureError(message)
-        return 0
+        self._link_type = interface.link_type
+        if not first:
+            return []
+        appended = self._appended()
+        if appended and appended.end:
+            self._go_on_behind(appended.head, interface.link_type)
+            return []
+        return [struct.pack("<" + _HEADER, self._magic, 2, 4, 0, 0, SNAP_LENGTH, interface.link_type)]
+
+    def _go_on_behind(self, head: bytes, link_type: int) -> None:
+        """Take over the unit of time of the header that is there. Raises CaptureError where packets can't follow it."""
+        magic, *_, there = struct.unpack("<" + _HEADER, head)
+        if magic not in {NANOSECONDS, MICROSECONDS}:
+            raise CaptureError(f"{self.output.name} is in another byte order, so nothing can follow; use another name")
+        if there & 0xFFFF != link_type:
+            message = f"{self.output.name} holds link type {link_type_name(there & 0xFFFF)}, and classic pcap only one"
+            raise CaptureError(f"{message}; use another name")
+        self._unit = 1 if magic == NANOSECONDS else 1000
 
     def _packet(self, time_ns: int, data: bytes, *, interface: int, flags: int, comment: str, dropped: int) -> bytes:
         del interface, flags, comment, dropped  # no place for them
-        if self._link_type is None:
-            raise ValueError("no interface was described")
         seconds, rest = divmod(time_ns, 1_000_000_000)
         return struct.pack("<" + _RECORD, seconds, rest // self._unit, len(data), len(data)) + data
 

@@ -107,17 +107,19 @@ class PcapngWriter(CaptureWriter):
     """Writes pcapng: little-endian, nanoseconds, one block a write."""
 
     def __init__(
-        self, output: Output, *, application: str = "dalyshark", hardware: str = "", os_name: str = ""
+        self,
+        output: Output,
+        *,
+        application: str = "dalyshark",
+        hardware: str = "",
+        os_name: str = "",
+        wait_when_full: bool = False,
     ) -> None:
-        super().__init__(output)
-        self._interfaces = 0
-        options = _options(_text(SHB_HARDWARE, hardware), _text(SHB_OS, os_name), _text(SHB_APPLICATION, application))
-        self._header = _block(SECTION_HEADER, _SECTION.pack(BYTE_ORDER_MAGIC, 1, 0, -1) + options)
+        super().__init__(output, wait_when_full=wait_when_full)
+        self._about = (_text(SHB_HARDWARE, hardware), _text(SHB_OS, os_name), _text(SHB_APPLICATION, application))
 
-    def add_interface(self, interface: Interface) -> int:
-        """Write an Interface Description Block, the first behind the section's header; its number, from 0."""
-        if self._interfaces == 0:
-            self._write(self._header)
+    def _introduction(self, interface: Interface, *, first: bool) -> list[bytes]:
+        """Lay out an Interface Description Block, the first behind the section's header."""
         options = _options(
             _text(IF_NAME, interface.name),
             _text(IF_DESCRIPTION, interface.description),
@@ -125,14 +127,13 @@ class PcapngWriter(CaptureWriter):
             _option(IF_TSRESOL, b"\x09"),
             _text(IF_HARDWARE, interface.hardware),
         )
-        self._write(_block(INTERFACE_DESCRIPTION, _INTERFACE.pack(interface.link_type, 0, 0) + options))
-        self._interfaces += 1
-        return self._interfaces - 1
+        described = _block(INTERFACE_DESCRIPTION, _INTERFACE.pack(interface.link_type, 0, 0) + options)
+        if not first:
+            return [described]
+        about = _options(*self._about, _text(COMMENT, self.origin))
+        return [_block(SECTION_HEADER, _SECTION.pack(BYTE_ORDER_MAGIC, 1, 0, -1) + about), described]
 
     def _packet(self, time_ns: int, data: bytes, *, interface: int, flags: int, comment: str, dropped: int) -> bytes:
-        if not 0 <= interface < self._interfaces:
-            message = f"interface {interface} was not described"
-            raise ValueError(message)
         options = b""
         if flags or comment or dropped:
             options = _options(

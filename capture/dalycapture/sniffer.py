@@ -50,6 +50,7 @@ class End(StrEnum):
     DURATION = "duration reached"
     PACKETS = "number of packets reached"
     FILESIZE = "file size reached"
+    FILES = "number of files reached"
     PORT_LOST = "port lost"
     READER_GONE = "reader of the pipe went away"
 
@@ -133,17 +134,12 @@ class Sniffer:
         with contextlib.ExitStack() as stack:
             stack.callback(self._close)
             stack.enter_context(self._stopped_by(stop_signals))
-            started, start_ns = time.monotonic(), self._clock()
+            started = time.monotonic()
             self._to_all(lambda sink: sink.add_interface(self._interface))
             self.tally.end = self._listen(started)
             self._write(self._framer.flush())
             self.tally.seconds = time.monotonic() - started
-            end_ns = self._clock()
-            self._to_all(
-                lambda sink: sink.write_statistics(
-                    0, start_ns=start_ns, end_ns=end_ns, received=sink.written + sink.lost, dropped=sink.lost
-                )
-            )
+            self._to_all(lambda sink: sink.finish())
         return self.tally
 
     def _listen(self, started: float) -> End:
@@ -159,7 +155,8 @@ class Sniffer:
                 self._watch_pipes(waiter)
                 if self._end:  # the last reader went away: nothing would wake us
                     break
-            wake_at = min(until, heard + SILENCE_S) if self._framer.pending else until
+            due = min(sink.due for sink in self._sinks)
+            wake_at = min(until, due, heard + SILENCE_S) if self._framer.pending else min(until, due)
             ready = waiter.wait(None if wake_at == math.inf else wake_at - now)
             now = time.monotonic()
             if port in ready:
@@ -168,6 +165,9 @@ class Sniffer:
             elif self._framer.pending and now - heard >= SILENCE_S:
                 self._write(self._framer.flush())
             self.tally.seconds = now - started
+            if now >= due:
+                self._to_all(lambda sink: sink.tick())
+                self._end = self._end or self._limit()
             if self._end is None and (self._stop_asked or now >= until):
                 self._end = End.STOPPED if self._stop_asked else End.DURATION
         return self._end
@@ -179,6 +179,8 @@ class Sniffer:
             return End.PACKETS
         if limits.filesize is not None and any(sink.output.size >= limits.filesize for sink in self._sinks):
             return End.FILESIZE
+        if any(sink.complete for sink in self._sinks):
+            return End.FILES
         return None
 
     def _on_port(self) -> None:

@@ -113,7 +113,7 @@ def test_tshark_reads_pcap(tmp_path: Path) -> None:
 def test_pcap_has_one_link_type() -> None:
     writer = PcapWriter(Memory())
     writer.add_interface(tap("a"))
-    assert writer.add_interface(tap("b")) == 0
+    assert writer.add_interface(tap("b")) == 1
     with pytest.raises(CaptureError, match=r"147 \(USER0\) and 148 \(USER1\); write pcapng"):
         writer.add_interface(tap("c", link_type=148))
 

@@ -18,13 +18,15 @@ from dalycapture.port import open_port
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalycapture.writer import counted
 from dalyref.kinds import Kind
-from dalytools import __version__
+from dalytools import __version__, file_options
 from dalytools.adapter_list import list_adapters
 from dalytools.port_options import PORT_HELP, add_port_options, checked, settings_of
 from dalytools.problem import Problem
 
 if TYPE_CHECKING:
     from dalycapture.framing import TimedRecord
+    from dalycapture.rotation import Keeping
+    from dalycapture.writer import CaptureWriter
 
 STATUS_EVERY_S = 0.25
 
@@ -44,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         type=_limit,
-        help="stop after duration:SECONDS, packets:N or filesize:KB (1000 bytes); may be given more than once",
+        help="stop after duration:SECONDS, packets:N, filesize:KB (1000 bytes) or, with -b, files:N; may be given more "
+        "than once",
     )
     parser.add_argument("-c", dest="packets", metavar="N", type=_positive, help="stop after N records")
     parser.add_argument("--bus", type=checked(bus_name), default="main", help="name of the bus (default: %(default)s)")
@@ -65,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="no status line and no summary")
     add_port_options(parser)
+    file_options.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,37 +79,47 @@ def run(args: argparse.Namespace) -> int:
         raise Problem("say which PORT to listen to; dalyshark capture --list shows what is there")
     if not args.output:
         raise Problem("say where the capture goes: -w FILE, or -w - for standard output")
-    limits = Limits()
+    limits, files = Limits(), None
     for name, value in args.limits:
-        limits = replace(limits, **{name: value})
+        if name == "files":
+            files = value
+        else:
+            limits = replace(limits, **{name: value})
     if args.packets is not None:
         limits = replace(limits, packets=args.packets)
     status = None if args.quiet or not sys.stderr.isatty() else _Status()
     try:
-        tally = _capture(args, limits, status)
+        tally, sink = _capture(args, limits, file_options.read(args, stop_after=files), status)
     except CaptureError as error:
         raise Problem(str(error)) from None
     finally:
         if status:
             status.clear()
+    tally.notes += sink.notes
     if not args.quiet:
         print(summary(tally, args.port, args.output, args.baud), file=sys.stderr)  # noqa: T201 - it is for the terminal
+    if sink.lost:
+        raise Problem(
+            f"{counted(sink.lost, 'record')} of {tally.records} could not be written: {'; '.join(sink.notes)}"
+        )
     if tally.end is End.PORT_LOST:
         raise Problem(tally.problem)
     return 0
 
 
-def _capture(args: argparse.Namespace, limits: Limits, status: _Status | None) -> Tally:
+def _capture(
+    args: argparse.Namespace, limits: Limits, keeping: Keeping, status: _Status | None
+) -> tuple[Tally, CaptureWriter]:
     settings = settings_of(args)
     port = open_port(args.port, settings)
     try:
         interface = tap_of(port, settings, bus=args.bus, link_type=args.link_type)
         # After the port: a wrong port does not cost an older capture of the same name.
-        sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}")
+        sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}", keeping=keeping)
         sniffer = Sniffer(port, interface, [sink], limits=limits, listener=status)
         if status:
             status.show(sniffer.tally)
-        return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM))
+        return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM)), sink
     finally:
         port.close()
 
@@ -179,11 +193,11 @@ def _limit(text: str) -> tuple[str, float | int]:
             return name, seconds
         message = f"{value!r} is not a number of seconds above 0"
         raise argparse.ArgumentTypeError(message)
-    if colon and name == "packets":
+    if colon and name in {"packets", "files"}:
         return name, _positive(value)
     if colon and name == "filesize":
         return name, _positive(value) * 1000
-    message = f"{text!r} is not a stop condition; use duration:SECONDS, packets:N or filesize:KB"
+    message = f"{text!r} is not a stop condition; use duration:SECONDS, packets:N, filesize:KB or files:N"
     raise argparse.ArgumentTypeError(message)
 
 

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,7 +20,6 @@ from dalycapture.reader import read_capture
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 COMMAND = [sys.executable, "-c", "import sys; from dalytools.cli import main; sys.exit(main())", "capture"]
 
@@ -85,9 +86,41 @@ def test_a_signal_is_a_normal_end(number: signal.Signals, bus: Bus, tmp_path: Pa
     packets = list(read_capture(path))
     assert [p.data for p in packets] == [numbered(n) for n in range(10)]
     assert packets[0].link_type == 150
-    assert packets[0].description == f"dalyshark bus=garage 9600 8N1 {bus.port}"
+    assert packets[0].description.startswith(f"dalyshark bus=garage 9600 8N1 {bus.port}; ")
     assert f"{path}: 10 records (10 good), 130 bytes in " in err
     assert f"from {bus.port} at 9600 baud; ended: stopped." in err
+
+
+def test_a_series_of_files_and_their_checksums(bus: Bus, tmp_path: Path) -> None:
+    words = ["-b", "packets:4", "-b", "printname:-", "-a", "files:3", "--sha256", "-q"]
+    process = start(bus.port, "-w", tmp_path / "x.pcapng", *words)
+    until(lambda: any(listening(path) for path in tmp_path.glob("x_00001_*.pcapng")))
+    bus.send(b"".join(numbered(count) for count in range(20)))
+    code, out, err = finish(process)
+    assert (code, err) == (0, "")
+    names = out.decode().split()
+    assert names == sorted(str(path) for path in tmp_path.glob("*.pcapng"))
+    assert len(names) == 3
+    for name in names:
+        told = Path(f"{name}.sha256").read_text(encoding="utf-8")
+        assert told.split()[0] == hashlib.sha256(Path(name).read_bytes()).hexdigest()
+
+
+def test_append_tells_what_it_cut_off(bus: Bus, tmp_path: Path) -> None:
+    path = tmp_path / "x.pcapng"
+    said = ""
+    for life in range(2):
+        process = start(bus.port, "-w", path, "--append", "-c", 2)
+        until(lambda life=life: size_of(path) > 0 and path.read_bytes().count(b"dalyshark bus=") == life + 1)
+        bus.send(numbered(2 * life) + numbered(2 * life + 1))
+        code, _, said = finish(process)
+        assert code == 0
+        if life == 0:
+            assert "torn" not in said
+            with path.open("ab") as file:
+                file.write(b"\x06\0\0\0\x30\0\0\0\x01")
+    assert "a torn end of 9 bytes was cut off" in said
+    assert [p.data for p in read_capture(path)] == [numbered(0), numbered(1), b"", numbered(2), numbered(3)]
 
 
 @pytest.mark.parametrize("option", [["-F", "pcap"], ["--pcap"]])
@@ -176,11 +209,21 @@ def test_what_can_be_wrong_is_one_line(bus: Bus, tmp_path: Path) -> None:
     [
         (["--link-type", "149"], "149 (USER2) is taken: Wireshark reads it as Apple's PKTAP; use 147, 148 or 150..162"),
         (["--link-type", "1"], "1 (Ethernet) is not for private use"),
-        (["-a", "files:3"], "'files:3' is not a stop condition; use duration:SECONDS, packets:N or filesize:KB"),
+        (
+            ["-a", "pages:3"],
+            "'pages:3' is not a stop condition; use duration:SECONDS, packets:N, filesize:KB or files:N",
+        ),
+        (
+            ["-b", "pages:3"],
+            "'pages:3' is not a condition for a new file; use duration:SECONDS, interval:SECONDS, filesize:KB",
+        ),
+        (["-b", "files:0"], "'files:0' is not a condition for a new file"),
+        (["-b", "duration:nan"], "'duration:nan' is not a condition for a new file"),
+        (["--sync", "-1"], "'-1' is not a number of seconds from 0 up"),
         (["-a", "duration:nan"], "'nan' is not a number of seconds above 0"),
         (["-c", "0"], "'0' is not a whole number from 1 up"),
         (["--bus", "a b"], "bus name 'a b' is not one word"),
-        (["--baud", "fast"], "'fast' is not a whole number"),
+        (["--baud", "fast"], "'fast' is not a baud rate"),
     ],
 )
 def test_unusable_options_are_one_line(words: list[str], message: str, tmp_path: Path) -> None:
