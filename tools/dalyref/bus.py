@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """One bus and what is remembered of it: from frames to fields (docs/records.md, sections 5 to 9).
 
-Only frames with a right checksum take part. What a request or an echo carries is not decoded, and changes nothing that
-is known about the batteries.
+Only frames with a right checksum take part, and on CAN classic frames. What a request or an echo carries is not
+decoded, and changes nothing that is known about the batteries.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dalyref.values import put
 
 if TYPE_CHECKING:
     from dalyref.exchange import Request
+    from dalyref.message import Message
     from dalyref.options import Options
     from dalyref.streams import Located
     from dalyref.values import Fields
@@ -50,25 +51,26 @@ class Slate:
 class Bus:
     """One interface, or several that are one bus."""
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, *, echoes: bool = True) -> None:
+        """Begin with nothing known. echoes: the wire may give a request back."""
         self.now_ns = 0
         """The latest beginning of a record."""
         self._options = options
         self._reply_ns = options.limit_ns(options.reply)
         self._burst_ns = options.limit_ns(options.burst)
-        self._exchange = Exchange[Slate](options)
+        self._exchange = Exchange[Slate](options, echoes=echoes)
         self._asked: dict[int, int] = {}  # requests seen, by data ID
         self._boards: dict[int, Board] = {}  # by address byte of replies
         self._burst: Burst[Slate] | None = None
 
-    def frame(self, located: Located, data: bytes, fields: Fields) -> Slate:
-        """Take an A5 frame: add what it means to its `fields`, and to those of records before it."""
+    def frame(self, located: Located, message: Message, fields: Fields) -> Slate:
+        """Take a frame: add what it means to its `fields`, and to those of records before it."""
         slate = Slate(fields, self)
         self._exchange.pass_time(located.start_ns)
-        if addresses.is_request(data[1]):
-            self._request(located, data, slate)
+        if message.route.asks:
+            self._request(located, message, slate)
         else:
-            self._reply(located, data, slate)
+            self._reply(located, message, slate)
         return slate
 
     def settle(self, slate: Slate, latest_ns: int) -> None:
@@ -83,46 +85,46 @@ class Bus:
             self._end_burst(known=known)
         slate.close()
 
-    def _request(self, located: Located, data: bytes, slate: Slate) -> None:
-        packet = located.packet
+    def _request(self, located: Located, message: Message, slate: Slate) -> None:
+        packet, data_id = located.packet, message.data_id
         asked = self._exchange.ask(
-            data, packet.number, located.start_ns, located.end_ns, side=packet.direction, owner=slate
+            message, packet.number, located.start_ns, located.end_ns, side=packet.direction, owner=slate
         )
         fields = slate.fields
         fields["daly.direction"] = asked.direction
-        board = addresses.board(data[1])
-        if board:
-            fields["daly.board"] = board
+        if message.route.board:
+            fields["daly.board"] = message.route.board
         if asked.direction == addresses.ECHO:
             return
         if asked.retry:
             fields["daly.retry"] = True
         if asked.second_host:
             fields["daly.second_host"] = True
-        if writes.is_write(data[2]):
+        if writes.is_write(data_id):
             fields["daly.write"] = True
-        self._asked[data[2]] = self._asked.get(data[2], 0) + 1
+        self._asked[data_id] = self._asked.get(data_id, 0) + 1
         slate.open_until_ns = located.end_ns + self._reply_ns
         slate.asks = True
 
-    def _reply(self, located: Located, data: bytes, slate: Slate) -> None:
-        fields = slate.fields
+    def _reply(self, located: Located, message: Message, slate: Slate) -> None:
+        fields, data_id = slate.fields, message.data_id
         fields["daly.direction"] = addresses.REPLY
-        board = addresses.board(data[1])
-        if board:
-            fields["daly.board"] = board
-        if data[2] in bursts.IDS:
-            self._part(located, data, slate)
+        if message.route.board:
+            fields["daly.board"] = message.route.board
+        if not message.whole:
+            self._answer(located, message, slate)
+        elif data_id in bursts.IDS:
+            self._part(located, message, slate)
         else:
             self._end_burst()
-            self._answer(located, data, slate)
-            fields.update(payload.decode(data[2], data[4:12]))
-            self._board(data[1]).reply(_seen(located), data[2], data[4:12], fields)
+            self._answer(located, message, slate)
+            fields.update(payload.decode(data_id, message.content))
+            self._board(message.route.address).reply(_seen(located), data_id, message.content, fields)
 
-    def _answer(self, located: Located, data: bytes, slate: Slate) -> int:
+    def _answer(self, located: Located, message: Message, slate: Slate) -> int:
         """Find the request of a reply; return its number, 0: none."""
         fields = slate.fields
-        answer = self._exchange.answer(data[2], data[1], located.start_ns)
+        answer = self._exchange.answer(message.data_id, message.route.board, located.start_ns)
         if answer.unasked:
             fields["daly.unasked"] = True
         if answer.late_to:
@@ -131,19 +133,19 @@ class Bus:
             fields["daly.other_board"] = True
         if answer.request is None:
             return 0
-        self._link(answer.request, located, data, slate)
+        self._link(answer.request, located, message, slate)
         return answer.request.number
 
     @staticmethod
-    def _link(request: Request[Slate], located: Located, data: bytes, slate: Slate) -> None:
+    def _link(request: Request[Slate], located: Located, message: Message, slate: Slate) -> None:
         """Tell a request and its reply about each other."""
         fields = slate.fields
         fields["daly.request_in"] = request.number
         after_ns = located.start_ns - request.end_ns
         if after_ns >= -TOLERANCE_NS:  # else the time stamps can't tell
             fields["daly.response_time"] = max(after_ns, 0) / NANO
-        if request.written:
-            fields["daly.write_result"] = writes.result(data[2], request.written, data[4:12])
+        if request.written and message.whole:
+            fields["daly.write_result"] = writes.result(message.data_id, request.written, message.content)
         request.owner.fields["daly.reply_in"] = located.packet.number
         request.owner.asks = False
         request.owner.close()
@@ -154,26 +156,27 @@ class Bus:
             board = self._boards[address] = Board(self._options)
         return board
 
-    def _part(self, located: Located, data: bytes, slate: Slate) -> None:
+    def _part(self, located: Located, message: Message, slate: Slate) -> None:
         """Take a reply that is one frame of several."""
-        fields, data_id, number = slate.fields, data[2], data[4]
+        fields, data_id, content = slate.fields, message.data_id, message.content
+        number = content[0]
         burst = self._burst
-        if burst is not None and not burst.continues(data_id, data[1], located.start_ns, self._burst_ns):
+        if burst is not None and not burst.continues(data_id, message.route.address, located.start_ns, self._burst_ns):
             burst = None
         if bursts.skipped(data_id, number, burst.base if burst is not None else 1):
             fields["daly.frame_number"] = number
             if data_id in cells.SLOTS:
-                fields["daly.reserved"] = data[5:12].hex()
+                fields["daly.reserved"] = content[1:].hex()
             else:
-                fields["daly.text_part"] = texts.shown(data[5:12])
+                fields["daly.text_part"] = texts.shown(content[1:])
             return
         asked = self._asked.get(data_id, 0)
         if burst is not None and (number < burst.last or (number == burst.last and asked > burst.asked)):
             burst = None
         if burst is None:
             self._end_burst()
-            request = self._answer(located, data, slate)
-            burst = self._begin(data, request, slate)
+            request = self._answer(located, message, slate)
+            burst = self._begin(message, request, slate)
             missing = range(burst.base, number)
         else:
             if burst.request:
@@ -187,21 +190,21 @@ class Bus:
         burst.last, burst.end_ns, burst.asked = number, located.end_ns, asked
         burst.owner, burst.owner_number = slate, located.packet.number
         burst.open_until_ns = located.end_ns + self._burst_ns
-        self._part_values(burst, located, data, slate)
+        self._part_values(burst, located, message, slate)
         if burst.whole_in == 0:
             slate.burst = burst  # the whole, or that it was cut off, may still be found out
 
-    def _begin(self, data: bytes, request: int, slate: Slate) -> Burst[Slate]:
-        address, data_id, number = data[1], data[2], data[4]
+    def _begin(self, message: Message, request: int, slate: Slate) -> Burst[Slate]:
+        address, data_id, number = message.route.address, message.data_id, message.content[0]
         board = self._board(address)
         count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
         base = 0 if number == 0 else 1
         self._burst = Burst(data_id, address, base, count, request, 0, number, 0, slate, whole=True)
         return self._burst
 
-    def _part_values(self, burst: Burst[Slate], located: Located, data: bytes, slate: Slate) -> None:
-        data_id, number, content, fields = data[2], data[4], data[4:12], slate.fields
-        packet = located.packet.number
+    def _part_values(self, burst: Burst[Slate], located: Located, message: Message, slate: Slate) -> None:
+        data_id, content, fields = message.data_id, message.content, slate.fields
+        number, packet = content[0], located.packet.number
         if data_id not in cells.SLOTS:
             fields["daly.frame_number"] = number
             fields["daly.text_part"] = texts.shown(content[1:])
@@ -214,7 +217,7 @@ class Bus:
             fields["daly.reassembled_in"] = burst.whole_in
         if burst.count and burst.whole and burst.reaches_end(number):
             fields.update(burst.table())
-            board = self._board(data[1])
+            board = self._board(message.route.address)
             if data_id == cells.CELLS:
                 board.cell_table(_seen(located), burst.slots(), fields)
             else:

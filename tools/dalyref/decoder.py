@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from dalyref.bus import Bus, Slate
 from dalyref.kinds import Dialect, Kind
+from dalyref.message import from_serial
 from dalyref.options import NANO, Options
 from dalyref.packet import SERIAL_LINK_TYPES
 from dalyref.streams import Located, Stream
@@ -167,7 +168,7 @@ class Decoder:
         if record is not None:
             _describe(record, fields)
             if kind is Kind.FRAME and record.dialect is Dialect.A5:
-                slate = bus.frame(located, data, fields)
+                slate = bus.frame(located, from_serial(data), fields)
         decoded = Decoded(
             packet.number,
             located.start_ns,

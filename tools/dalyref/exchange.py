@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from dalyref import addresses, writes
 
 if TYPE_CHECKING:
+    from dalyref.message import Message
     from dalyref.options import Options
     from dalyref.packet import Direction
 
@@ -71,7 +72,9 @@ class Answer(Generic[T]):
 class Exchange(Generic[T]):
     """The requests of one bus."""
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, *, echoes: bool = True) -> None:
+        """Begin without any. echoes: the wire may give a request back (CAN does not)."""
+        self._echoes = echoes
         self._wait_ns = options.limit_ns(options.reply)
         self._echo_ns = options.limit_ns(options.echo)
         self._late_ns = options.limit_ns(options.late)
@@ -87,40 +90,40 @@ class Exchange(Generic[T]):
     def _waits(self, request: Request[T]) -> bool:
         return self._latest_ns - request.end_ns <= self._wait_ns
 
-    def ask(self, frame: bytes, number: int, start_ns: int, end_ns: int, *, side: Direction, owner: T) -> Asked:
+    def ask(self, message: Message, number: int, start_ns: int, end_ns: int, *, side: Direction, owner: T) -> Asked:
         """Take a frame from a host."""
-        before = self._newest.pop(frame, None)
+        route = message.route
+        before = self._newest.pop(message.same, None)
         retry = False
         if before is not None and not before.answered and self._waits(before):
-            if before.side and side:
+            if not self._echoes:
+                echo = False
+            elif before.side and side:
                 echo = before.side != side
             else:
                 echo = not before.echoed and start_ns - before.end_ns <= self._echo_ns
             if echo:
                 before.echoed = True
-                self._newest[frame] = before
+                self._newest[message.same] = before
                 return Asked(addresses.ECHO)
             retry = True
-        address, data_id = frame[1], frame[2]
-        written = frame[4:12] if writes.is_write(data_id) else b""
-        request = Request(
-            number, end_ns, side, addresses.only_board(address), addresses.named_board(address), written, owner
-        )
-        self._newest[frame] = request
+        data_id = message.data_id
+        written = message.content if message.whole and writes.is_write(data_id) else b""
+        request = Request(number, end_ns, side, route.only, route.named, written, owner)
+        self._newest[message.same] = request
         if len(self._newest) > _MOST_DIFFERENT:
             del self._newest[next(iter(self._newest))]
         asked = self._asked.setdefault(data_id, [])
         while asked and (len(asked) >= _MOST_ASKED or self._latest_ns - asked[0].end_ns > self._late_ns):
             del asked[0]
         asked.append(request)
-        host, last = addresses.host(address), self._host
+        host, last = route.host, self._host
         self._host = (host, end_ns)
         second = last is not None and last[0] != host and start_ns - last[1] <= self._wait_ns
         return Asked(addresses.REQUEST, retry, second)
 
-    def answer(self, data_id: int, address: int, start_ns: int) -> Answer[T]:
-        """Take a reply (the first of its burst): find the request it belongs to, which then waits no more."""
-        board = addresses.board(address)
+    def answer(self, data_id: int, board: int, start_ns: int) -> Answer[T]:
+        """Take a board's reply (the first of its burst): find the request it belongs to, which then waits no more."""
         asked = self._asked.get(data_id, [])
         for index in range(len(asked) - 1, -1, -1):
             request = asked[index]
