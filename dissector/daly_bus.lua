@@ -8,6 +8,11 @@
 --
 -- feed() is called once per A5 frame, in the order of the capture. What it finds out is kept in daly_results' columns,
 -- so that an ordinary frame costs no table.
+--
+-- A frame of CAN comes in the form of an A5 frame, on a bus that says so (bus.can): its length may be other than 8, its
+-- bytes are filled up to eight, and the destination stands where the checksum would (docs/wires.md 2):
+--
+--   A5 | source | data ID | length | d0 d1 d2 d3 d4 d5 d6 d7 | destination
 
 local exchange = require("daly_exchange")
 local results_module = require("daly_results")
@@ -65,6 +70,10 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
         burst.asked = true
       end
     end
+  elseif byte(raw, 4) ~= 8 then -- on CAN: it answers, and says nothing
+    link[slot], wait[slot], memory[slot] = false, false, false
+    local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
+    link[slot], wait[slot] = request or false, waited or false
   elseif BURST_IDS[id] then
     link[slot], wait[slot], memory[slot] = false, false, false
     local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends)

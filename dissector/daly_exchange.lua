@@ -77,7 +77,9 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
   local before = state.last[raw]
   if before and not before.answered and state.latest - before.ended <= times.reply + GRACE then
     local echo
-    if side and before.side then
+    if bus.can then
+      echo = false -- nothing on CAN hears itself
+    elseif side and before.side then
       echo = side ~= before.side
     else
       echo = not before.echoed and starts - before.ended <= times.echo + GRACE
@@ -94,9 +96,9 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     number = number,
     ended = ends,
     side = side,
-    board = names and address - 0x3F or nil, -- the board it names
-    others = address <= 0x40 or address > 0x4F, -- any board's reply will do
-    data = is_write(id) and sub(raw, 5, 12) or nil,
+    board = bus.can and byte(raw, 13) or names and address - 0x3F or nil, -- the board it names
+    others = not bus.can and (address <= 0x40 or address > 0x4F), -- any board's reply will do
+    data = is_write(id) and byte(raw, 4) == 8 and sub(raw, 5, 12) or nil,
   }
   if not before then
     state.remembered = state.remembered + 1
@@ -166,7 +168,7 @@ function M.answer(bus, slot, number, raw, address, id, starts)
         if request.board and request.board ~= address and address >= 0x01 and address <= 0x10 then
           odd_of(bus.results, slot).other_board = request.board
         end
-        if request.data then
+        if request.data and byte(raw, 4) == 8 then
           odd_of(bus.results, slot).result = write_result(id, raw, request.data)
         end
         local wait = starts - request.ended

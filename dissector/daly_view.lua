@@ -183,6 +183,10 @@ end
 
 local frame = {} -- the one at hand, for daly_payload
 
+-- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and destination,
+-- board = function(raw), show = function(raw): fields of its head }. nil: an A5 frame.
+local carrier
+
 -- What a frame's rare things say (daly_results' odd): expert notes.
 local function note_odd(item, odd, id)
   if odd.late_to then
@@ -255,7 +259,7 @@ local function request(item, raw, slot, id, flag, text)
     item:add_proto_expert_info(experts.echo)
   else
     if exchange.is_write(id) then
-      local words = payload.write_words(id, raw)
+      local words = byte(raw, 4) == 8 and payload.write_words(id, raw) or "not of eight bytes"
       item:add_proto_expert_info(experts.write, "WRITE: " .. words)
       text = format("WRITE%s: %s", text:gsub("^Request", ""), words)
     end
@@ -291,17 +295,28 @@ local function show_place(slot)
   end
 end
 
--- An A5 frame: fields, expert notes; returns words, source, destination.
+-- An A5 frame: fields, expert notes; returns words, source, destination. What it means does not depend on its carrier.
 local function a5(item, raw, slot)
-  local address, id = byte(raw, 2, 3)
+  local address, id, length = byte(raw, 2, 4)
   local flag, odd = results.flag[slot], results.odd[slot]
-  local text, source, destination = names_of(address, id)
+  local text, source, destination
+  if carrier then
+    text, source, destination = carrier.names(raw)
+  else
+    text, source, destination = names_of(address, id)
+  end
   local reply = address < 0x20
   local wait = results.wait[slot]
   if wanted then
-    show_frame(1)
+    local board
+    if carrier then
+      carrier.show(raw)
+      board = carrier.board(raw)
+    else
+      show_frame(1)
+      board = board_of(address)
+    end
     made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
-    local board = board_of(address)
     if board then
       made(fields.board, board)
     end
@@ -313,13 +328,14 @@ local function a5(item, raw, slot)
   if reply then
     local memory = results.memory[slot]
     frame.raw, frame.memory, frame.table, frame.text = raw, memory, nil, nil
-    local numbered = bursts.IDS[id]
+    local whole = length == 8 -- else it says nothing
+    local numbered = whole and bursts.IDS[id]
     if numbered then
       frame.table, frame.text = payload.whole(slot, memory, again)
     end
-    local words = payload.words[id]
-    text = text .. (words and words(frame) or hex_words(raw, 5, 12))
-    if id == 0x98 or (type(memory) == "table" and memory.burst) then
+    local words = whole and payload.words[id]
+    text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
+    if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
       local complaints = payload.complaints(id, frame)
       for i = 1, #complaints do
         item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
@@ -344,7 +360,7 @@ local function a5(item, raw, slot)
           made(fields.cut_off, true)
         end
       end
-      if payload.show[id] then
+      if whole and payload.show[id] then
         payload.show[id](frame, out, odd and odd.from)
       end
     end
@@ -524,6 +540,39 @@ function M.several(parent, buffer, raw, items, pinfo)
     cols.dst = destination
   end
 end
+
+--- A packet that is one record of `kind`, whose `length` bytes stand at the buffer's beginning. `show(item, thing,
+-- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source, destination;
+-- `raw` and `slot`: for daly_stat.
+function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing)
+  local node = begin(parent, buffer, 0, length, kind)
+  at = -4
+  frame.table = nil
+  local text, source, destination = show(node, thing, wanted)
+  local cols = pinfo.cols
+  cols.protocol = "Daly"
+  cols.info = text
+  if source then
+    cols.src = source
+    cols.dst = destination
+  end
+  if visible then
+    node:append_text(", " .. text)
+  end
+  if M.tap then
+    M.tap(pinfo.number, kind, raw, slot, frame.table, results)
+  end
+end
+
+--- Show a frame with another carrier (above) by what it means: for M.one. `raw`: in the form of an A5 frame (daly_bus).
+function M.a5_on(item, raw, slot, by)
+  carrier = by
+  local text, source, destination = a5(item, raw, slot)
+  carrier = nil
+  return text, source, destination
+end
+
+M.out, M.id_words, M.host_name = out, id_words, host_name
 
 --- A packet that is one whole A5 frame, which is the usual one.
 function M.whole(parent, buffer, raw, slot, pinfo)
