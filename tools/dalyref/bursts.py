@@ -37,20 +37,20 @@ class Burst(Generic[T]):
     """Cells or sensors known at its first frame, 0: not known."""
     request: int
     """Number of the request it answers, 0: none."""
-    asked: int
-    """How many requests for this ID had been seen when its last frame came."""
-    last: int
-    """Its last, which is its highest, frame number."""
-    end_ns: int
-    """End of its last frame."""
     owner: T
     """The record of its last frame."""
-    whole: bool
-    """No number is missing so far."""
-    open_until_ns: int = 0
-    """It ends when a record begins later."""
     owner_number: int = 0
     """Packet of its last frame."""
+    asked: int = 0
+    """How many requests for this ID had been seen when its last frame came."""
+    last: int = field(init=False)
+    """Its last, which is its highest, frame number; before the first the number before its base."""
+    end_ns: int = 0
+    """End of its last frame."""
+    open_until_ns: int = 0
+    """It ends when a record begins later."""
+    whole: bool = True
+    """No number is missing so far."""
     parts: list[T] = field(default_factory=list[T])
     """Its records that are not linked to the whole yet, without those that carry it."""
     whole_in: int = 0
@@ -59,6 +59,9 @@ class Burst(Generic[T]):
     """Frame number to slots: of 95 in mV, of 96 as sent."""
     text: dict[int, bytes] = field(default_factory=dict[int, bytes])
     """Frame number to characters, of a text."""
+
+    def __post_init__(self) -> None:
+        self.last = self.base - 1
 
     def continues(self, data_id: int, address: int, start_ns: int, longest_ns: int) -> bool:
         """Tell whether a reply is of the same kind and near enough to go on with this burst."""

@@ -7,15 +7,14 @@ decoded, and changes nothing that is known about the batteries.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dalyref import addresses, bursts, cells, payload, texts, writes
+from dalyref import addresses, bursts, cells, parts, payload, writes
 from dalyref.board import Board, Seen
 from dalyref.bursts import Burst
 from dalyref.exchange import Exchange
 from dalyref.options import NANO, TOLERANCE_NS
-from dalyref.values import put
+from dalyref.slate import Slate
 
 if TYPE_CHECKING:
     from dalyref.exchange import Request
@@ -23,29 +22,6 @@ if TYPE_CHECKING:
     from dalyref.options import Options
     from dalyref.streams import Located
     from dalyref.values import Fields
-
-
-@dataclass(slots=True, eq=False)
-class Slate:
-    """The fields of one record, and until when something may be added to them."""
-
-    fields: Fields
-    bus: Bus
-    open_until_ns: int = 0
-    """A record of this bus that begins later settles it; 0: settled."""
-    asks: bool = False
-    """It is a request that nobody has answered."""
-    burst: Burst[Slate] | None = None
-    """The burst it is a part of, while that may still say something of it."""
-
-    def waits_until(self) -> int:
-        """Return when it is settled by time, ns; 0: it is settled."""
-        return self.burst.open_until_ns if self.burst is not None else self.open_until_ns
-
-    def close(self) -> None:
-        """Nothing more comes to it."""
-        self.open_until_ns = 0
-        self.burst = None
 
 
 class Bus:
@@ -164,11 +140,7 @@ class Bus:
         if burst is not None and not burst.continues(data_id, message.route.address, located.start_ns, self._burst_ns):
             burst = None
         if bursts.skipped(data_id, number, burst.base if burst is not None else 1):
-            fields["daly.frame_number"] = number
-            if data_id in cells.SLOTS:
-                fields["daly.reserved"] = content[1:].hex()
-            else:
-                fields["daly.text_part"] = texts.shown(content[1:])
+            parts.skip(data_id, content, slate)
             return
         asked = self._asked.get(data_id, 0)
         if burst is not None and (number < burst.last or (number == burst.last and asked > burst.asked)):
@@ -176,80 +148,28 @@ class Bus:
         if burst is None:
             self._end_burst()
             request = self._answer(located, message, slate)
-            burst = self._begin(message, request, slate)
-            missing = range(burst.base, number)
-        else:
-            if burst.request:
-                fields["daly.request_in"] = burst.request
-            missing = range(burst.last + 1, number)
-            if number == burst.last:
-                fields["daly.burst.repeat"] = True
-        if missing:
-            burst.whole = False
-            put(fields, "daly.burst.missing", missing)
-        burst.last, burst.end_ns, burst.asked = number, located.end_ns, asked
-        burst.owner, burst.owner_number = slate, located.packet.number
-        burst.open_until_ns = located.end_ns + self._burst_ns
-        self._part_values(burst, located, message, slate)
-        if burst.whole_in == 0:
-            slate.burst = burst  # the whole, or that it was cut off, may still be found out
-
-    def _begin(self, message: Message, request: int, slate: Slate) -> Burst[Slate]:
-        address, data_id, number = message.route.address, message.data_id, message.content[0]
-        board = self._board(address)
-        count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
-        base = 0 if number == 0 else 1
-        self._burst = Burst(data_id, address, base, count, request, 0, number, 0, slate, whole=True)
-        return self._burst
-
-    def _part_values(self, burst: Burst[Slate], located: Located, message: Message, slate: Slate) -> None:
-        data_id, content, fields = message.data_id, message.content, slate.fields
-        number, packet = content[0], located.packet.number
-        if data_id not in cells.SLOTS:
-            fields["daly.frame_number"] = number
-            fields["daly.text_part"] = texts.shown(content[1:])
-            burst.text[number] = content[1:]
-        else:
-            real = cells.used(data_id, number, burst.base, burst.count)
-            fields.update(cells.decode(data_id, content, real))
-            burst.values[number] = cells.cells(content) if data_id == cells.CELLS else tuple(content[1:])
-        if burst.whole_in:
-            fields["daly.reassembled_in"] = burst.whole_in
-        if burst.count and burst.whole and burst.reaches_end(number):
-            fields.update(burst.table())
+            burst = self._burst = self._begin(message, request, slate)
+        elif burst.request:
+            fields["daly.request_in"] = burst.request
+        burst.asked = asked
+        if parts.take(burst, located, content, slate, self._burst_ns):
             board = self._board(message.route.address)
             if data_id == cells.CELLS:
                 board.cell_table(_seen(located), burst.slots(), fields)
             else:
                 board.sensor_table(_seen(located), burst.slots(), fields)
-            self._link_parts(burst, packet)
-        elif burst.whole_in == 0:
-            burst.parts.append(slate)
 
-    @staticmethod
-    def _link_parts(burst: Burst[Slate], packet: int) -> None:
-        """Tell the records of a burst that came before where the whole of it stands."""
-        for part in burst.parts:
-            part.fields["daly.reassembled_in"] = packet
-            part.close()
-        burst.parts.clear()
-        burst.whole_in = burst.whole_in or packet
+    def _begin(self, message: Message, request: int, slate: Slate) -> Burst[Slate]:
+        address, data_id = message.route.address, message.data_id
+        board = self._board(address)
+        count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
+        return Burst(data_id, address, 0 if message.content[0] == 0 else 1, count, request, slate)
 
     def _end_burst(self, *, known: bool = True) -> None:
         """End the running burst. known: it is sure that it has ended, the capture does not merely stop."""
         burst, self._burst = self._burst, None
-        if burst is None:
-            return
-        if burst.needs_end:
-            whole = burst.table()
-            if whole:
-                burst.owner.fields.update(whole)
-                burst.parts.remove(burst.owner)
-                self._link_parts(burst, burst.owner_number)
-        if known and burst.cut_off:
-            burst.owner.fields["daly.burst.cut_off"] = True
-        for part in (*burst.parts, burst.owner):
-            part.close()
+        if burst is not None:
+            parts.end(burst, known=known)
 
 
 def _seen(located: Located) -> Seen:

@@ -14,7 +14,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dalyref.bus import Bus, Slate
+from dalyref.bus import Bus
 from dalyref.kinds import Dialect, Kind
 from dalyref.message import from_serial
 from dalyref.options import NANO, Options
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from dalyref.kinds import Record
     from dalyref.packet import Direction, Packet
+    from dalyref.slate import Slate
     from dalyref.values import Fields
 
 __all__ = ["Decoded", "Decoder", "Options", "decode"]
