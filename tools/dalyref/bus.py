@@ -43,6 +43,8 @@ class Bus:
         """Take a frame: add what it means to its `fields`, and to those of records before it."""
         slate = Slate(fields, self)
         self._exchange.pass_time(located.start_ns)
+        if not payload.is_known(message.data_id):
+            fields["daly.unknown_id"] = True
         if message.route.asks:
             self._request(located, message, slate)
         else:
@@ -78,6 +80,8 @@ class Bus:
             fields["daly.second_host"] = True
         if writes.is_write(data_id):
             fields["daly.write"] = True
+            if message.whole:
+                fields.update(writes.would_set(data_id, message.content))
         self._asked[data_id] = self._asked.get(data_id, 0) + 1
         slate.open_until_ns = located.end_ns + self._reply_ns
         slate.asks = True

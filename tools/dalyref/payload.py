@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Eight data bytes of a reply to values, by data ID (vendor's paper V1.2, section 3). All numbers are big-endian.
+"""Eight data bytes of a reply to values, by data ID. All numbers are big-endian.
+
+Those of the vendor's paper V1.2, section 3, are here; the others in ``settings``, ``alarms`` and ``writes``.
 
          byte  0     1     2     3     4     5     6     7
     90       | pack V x 10 | gather x10| A x 10 + 30000 | SOC x 10 |
@@ -18,7 +20,7 @@ from __future__ import annotations
 from struct import Struct
 from typing import TYPE_CHECKING
 
-from dalyref import cells, faults
+from dalyref import alarms, cells, faults, settings, writes
 from dalyref.values import put
 
 if TYPE_CHECKING:
@@ -135,7 +137,23 @@ DECODERS: dict[int, Callable[[bytes], Fields]] = {
 """By data ID. 95 and 96 as they stand alone, all slots taken for cells or sensors: see ``bursts`` for more."""
 
 
+_KNOWN = frozenset(
+    (0x00, 0x02, *range(0x10, 0x2B), *range(0x50, 0x6B), *range(0x70, 0x8B), *range(0x90, 0x9B), 0xD8, 0xD9, 0xDA)
+)
+
+
+def is_known(data_id: int) -> bool:
+    """Tell whether a data ID stands in any table of docs/protocol.md."""
+    return data_id in _KNOWN
+
+
 def decode(data_id: int, data: bytes) -> Fields:
-    """Decode the eight data bytes of one reply; an ID that is not in the paper has no values."""
+    """Decode the eight data bytes of one reply; an ID whose bytes nobody has explained has no values."""
     decoder = DECODERS.get(data_id)
-    return decoder(data) if decoder else {}
+    if decoder:
+        return decoder(data)
+    if data_id in alarms.IDS:
+        return alarms.decode(data_id, data)
+    if data_id in writes.SWITCHES:
+        return writes.switched(data_id, data)
+    return settings.decode(data_id, data)

@@ -30,6 +30,11 @@ def shown(characters: bytes) -> str:
     return "".join(chr(byte) if 0x20 <= byte <= 0x7E else "?" for byte in characters)
 
 
+def trimmed(characters: bytes) -> str:
+    """Return the characters without the padding at their end; empty where there is nothing else."""
+    return shown(characters.rstrip(_PADDING))
+
+
 def whole(parts: Mapping[int, bytes]) -> str:
-    """Put the characters of a burst's frames together, by frame number; empty where there is nothing but padding."""
-    return shown(b"".join(parts[number] for number in sorted(parts)).rstrip(_PADDING))
+    """Put the characters of a burst's frames together, by frame number."""
+    return trimmed(b"".join(parts[number] for number in sorted(parts)))

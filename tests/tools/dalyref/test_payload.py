@@ -61,8 +61,7 @@ def test_real_replies(row: real.Row) -> None:
     frame = bytes.fromhex(row["hex"])
     expect: dict[str, Any] = row.get("expect") or {}
     if not 0x90 <= frame[2] <= 0x98:
-        expect = {}
-        assert set(read(frame)) == set(HEADER) | {"daly.board"}
+        expect = {}  # see test_settings and test_writes
     fields = read(frame)
     for key, value in expect.items():
         if key in SAME:
@@ -227,9 +226,38 @@ def test_article_s_example() -> None:
     assert fields["daly.fault.sum_volt_low_level_2"] is True
 
 
-@pytest.mark.parametrize("data_id", [0x00, 0x50, 0x8F, 0x99, 0xD8, 0xD9])
-def test_other_ids_have_no_values(data_id: int) -> None:
+# docs/protocol.md: no layout, or one that sources disagree about; 10, 21, 2A only write, so their replies tell nothing
+@pytest.mark.parametrize("data_id", [0x00, 0x02, 0x10, 0x21, 0x2A, 0x58, 0x64, 0x9A])
+def test_ids_without_a_layout_have_no_values(data_id: int) -> None:
     assert set(read(a5.build(1, data_id, b"\x01" * 8))) == set(HEADER) | {"daly.board"}
+
+
+# records.md 5: "it is not 00, 02, 10..2A, 50..6A, 70..8A, 90..9A, D8, D9 or DA"
+@pytest.mark.parametrize(
+    ("first", "last", "unknown"),
+    [
+        (0x00, 0x00, False),
+        (0x01, 0x01, True),
+        (0x02, 0x02, False),
+        (0x03, 0x0F, True),
+        (0x10, 0x2A, False),
+        (0x2B, 0x4F, True),
+        (0x50, 0x6A, False),
+        (0x6B, 0x6F, True),
+        (0x70, 0x8A, False),
+        (0x8B, 0x8F, True),
+        (0x90, 0x9A, False),
+        (0x9B, 0xD7, True),
+        (0xD8, 0xDA, False),
+        (0xDB, 0xFF, True),
+    ],
+)
+def test_unknown_ids(first: int, last: int, unknown: bool) -> None:
+    for data_id in range(first, last + 1):
+        for address in (0x01, 0x40):
+            assert read(a5.build(address, data_id)).get("daly.unknown_id", False) is unknown
+        if unknown:
+            assert set(read(a5.build(1, data_id, b"\x01" * 8))) == {*HEADER, "daly.board", "daly.unknown_id"}
 
 
 def test_requests_have_no_values() -> None:
