@@ -64,10 +64,13 @@ class _Device:
         import fcntl
         import termios
 
+        if self._fd < 0:
+            return
         # A pty outlives our closing, and would stay closed to others (a kill leaves it so; real ports forget).
         with contextlib.suppress(OSError):
             fcntl.ioctl(self._fd, termios.TIOCNXCL)
         os.close(self._fd)
+        self._fd = -1
 
 
 def open_device(name: str, settings: Settings, line: Line | None = None) -> Port:

@@ -28,20 +28,22 @@ READ_SIZE: Final = 4096  # the kernel's line discipline holds no more
 class Latency:
     """For how long bytes may be on their way from the wire to us, in ms, and how that is known.
 
-    hold_ms: an adapter's buffer may hold a byte back for so long. way_ms: what the way to the computer adds.
+    hold_ms: an adapter's buffer may hold a byte back for so long. way_ms: what the way to the computer adds. learns: it
+    is an assumption, to be corrected by what is seen.
     """
 
     hold_ms: float
     way_ms: float
     source: str
+    learns: bool = False
 
     def __str__(self) -> str:
         return f"{self.hold_ms:g} ms ({self.source})"
 
 
-PROMPT: Final = Latency(0.0, 0.0, "pseudo-terminal")
-ASSUMED: Final = Latency(16.0, 1.0, "assumed; --latency tells better")
-NETWORK: Final = Latency(50.0, 50.0, "assumed for a network; --latency tells better")
+PROMPT: Final = Latency(0.0, 0.0, "pseudo-terminal", learns=True)
+ASSUMED: Final = Latency(16.0, 1.0, "assumed", learns=True)
+NETWORK: Final = Latency(50.0, 50.0, "assumed for a network", learns=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from dalycapture.interface import tap
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.rotation import Keeping
-from dalycapture.sniffer import Limits, Sniffer
+from dalycapture.sniffer import Limits, Side, Sniffer
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -144,7 +144,7 @@ def test_a_real_one(small: Path) -> None:
     with Bus() as bus:
         port = open_port(bus.port)
         writer = open_writer(path, keeping=WAIT)
-        sniffer = Sniffer(port, tap("x"), [writer], limits=Limits(packets=sent))
+        sniffer = Sniffer([Side(port, tap("x"))], [writer], limits=Limits(packets=sent))
 
         def feed() -> None:
             for number in range(sent):

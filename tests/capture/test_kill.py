@@ -24,9 +24,10 @@ import sys
 from dalycapture.create import open_writer
 from dalycapture.interface import tap
 from dalycapture.port import open_port
-from dalycapture.sniffer import Sniffer
+from dalycapture.sniffer import Side, Sniffer
 port = open_port(sys.argv[1])
-sniffer = Sniffer(port, tap("x"), [open_writer(sys.argv[2])], listener=lambda one: print(one.record.start, flush=True))
+side = Side(port, tap("x"))
+sniffer = Sniffer([side], [open_writer(sys.argv[2])], listener=lambda one: print(one.record.start, flush=True))
 print("open", flush=True)
 sniffer.run()
 """

@@ -21,7 +21,7 @@ from dalycapture.interface import tap
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.rotation import Keeping, Rotation
-from dalycapture.sniffer import End, Limits, Sniffer
+from dalycapture.sniffer import End, Limits, Side, Sniffer
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -122,7 +122,7 @@ def test_a_silent_bus_still_gets_its_files(tmp_path: Path) -> None:
     with Bus() as bus:
         port = open_port(bus.port)
         writer = series(tmp_path, duration=0.1)
-        tally = Sniffer(port, tap("x"), [writer], limits=Limits(duration=0.55)).run()
+        tally = Sniffer([Side(port, tap("x"))], [writer], limits=Limits(duration=0.55)).run()
         port.close()
     paths = captures(tmp_path)
     assert 3 <= len(paths) <= 6
@@ -154,7 +154,7 @@ def test_the_end_after_so_many_files(tmp_path: Path) -> None:
     with Bus() as bus:
         port = open_port(bus.port)
         bus.send(b"".join(numbered(n) for n in range(20)))
-        tally = Sniffer(port, tap("x"), [series(tmp_path, packets=4, stop_after=3)]).run()
+        tally = Sniffer([Side(port, tap("x"))], [series(tmp_path, packets=4, stop_after=3)]).run()
         port.close()
     assert tally.end is End.FILES
     assert len(captures(tmp_path)) == 3

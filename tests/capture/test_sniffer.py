@@ -21,7 +21,7 @@ from dalycapture.pcapng import PcapngWriter
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.settings import Settings
-from dalycapture.sniffer import End, Limits, Sniffer, Tally
+from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally
 from dalycapture.waiting import Waiter
 from dalyref.kinds import Kind
 
@@ -91,7 +91,7 @@ def sniffing(
     limits: Limits | None = None,
     listener: Callable[[TimedRecord], None] | None = None,
 ) -> Generator[Running]:
-    running = Running(Sniffer(port, tap_of(port, Settings()), sinks, limits=limits, listener=listener))
+    running = Running(Sniffer([Side(port, tap_of(port, Settings()))], sinks, limits=limits, listener=listener))
     try:
         yield running
     finally:
@@ -169,7 +169,7 @@ def test_stop_after_duration_on_a_silent_bus(port: Port, tmp_path: Path) -> None
 
 
 def test_stop_before_and_after(port: Port, tmp_path: Path) -> None:
-    sniffer = Sniffer(port, tap("x"), [open_writer(tmp_path / "x.pcapng")])
+    sniffer = Sniffer([Side(port, tap("x"))], [open_writer(tmp_path / "x.pcapng")])
     sniffer.stop()
     assert sniffer.run().end is End.STOPPED
     sniffer.stop()
@@ -303,7 +303,7 @@ def test_a_full_disk_ends_it_and_all_is_counted(bus: Bus, port: Port) -> None:
     writer.add_interface(tap("x"))
     small.room = small.size + 200 + 3 * 48  # the description that run() writes, and three packets
     bus.send(FRAME * 8 + FRAME[:4])
-    sniffer = Sniffer(port, tap("x"), [writer])
+    sniffer = Sniffer([Side(port, tap("x"))], [writer])
     with pytest.raises(CaptureError) as caught:
         sniffer.run()
     assert 0 < writer.written < 8
@@ -319,5 +319,5 @@ def test_a_listener_error_leaves_a_whole_file(bus: Bus, port: Port, tmp_path: Pa
     path = tmp_path / "x.pcapng"
     bus.send(FRAME)
     with pytest.raises(ZeroDivisionError):
-        Sniffer(port, tap("x"), [open_writer(path)], listener=fail).run()
+        Sniffer([Side(port, tap("x"))], [open_writer(path)], listener=fail).run()
     assert [p.data for p in read_capture(path)] == [FRAME]

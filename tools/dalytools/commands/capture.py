@@ -15,7 +15,7 @@ from dalycapture.errors import CaptureError
 from dalycapture.interface import bus_name, tap_of
 from dalycapture.linktype import DEFAULT_LINK_TYPE, check_link_type
 from dalycapture.port import open_port
-from dalycapture.sniffer import End, Limits, Sniffer, Tally
+from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally
 from dalycapture.writer import counted
 from dalyref.kinds import Kind
 from dalytools import __version__, file_options
@@ -116,7 +116,7 @@ def _capture(
         interface = tap_of(port, settings, bus=args.bus, link_type=args.link_type)
         # After the port: a wrong port does not cost an older capture of the same name.
         sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}", keeping=keeping)
-        sniffer = Sniffer(port, interface, [sink], limits=limits, listener=status)
+        sniffer = Sniffer([Side(port, interface, settings=settings)], [sink], limits=limits, listener=status)
         if status:
             status.show(sniffer.tally)
         return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM)), sink

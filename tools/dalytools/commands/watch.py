@@ -25,7 +25,7 @@ from dalycapture.errors import CaptureError
 from dalycapture.interface import bus_name, tap_of
 from dalycapture.port import open_port
 from dalycapture.reader import read_capture
-from dalycapture.sniffer import End, Limits, Sniffer, Tally
+from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally
 from dalyref.decoder import Options, decode
 from dalytools import __version__
 from dalytools.commands.check import SHOWN
@@ -177,7 +177,7 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path
             )
             stack.callback(view.finish)
             sinks.append(view.sink)
-        sniffer = Sniffer(port, interface, sinks, limits=Limits(duration=duration))
+        sniffer = Sniffer([Side(port, interface, settings=settings)], sinks, limits=Limits(duration=duration))
         screen.when_gone = sniffer.stop
         if screen.failure:  # nobody reads already
             sniffer.stop()
