@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+import os
 import platform
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dalycapture.errors import CaptureError
-from dalycapture.output import open_output, open_pipe
+from dalycapture.output import open_output, open_pipe, reason, refuse_other_files
 from dalycapture.pcap import PcapWriter
 from dalycapture.pcapng import PcapngWriter
 from dalycapture.rotation import FileSeries, Keeping, Rotation
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from dalycapture.output import Output
     from dalycapture.writer import CaptureWriter
 
@@ -42,6 +46,32 @@ def open_writer(
         os_name=f"{platform.system()} {platform.release()}",
         wait_when_full=keeping.wait_when_full,
     )
+
+
+@contextmanager
+def new_capture(
+    path: Path | str, file_format: Literal["pcapng", "pcap"] = "pcapng", *, application: str = "dalyshark"
+) -> Generator[CaptureWriter]:
+    """Make a capture file that appears whole: written beside its place, renamed when the block ends well.
+
+    ``-`` and what is no regular file are written directly. An older capture of that name is replaced, nothing else is.
+    Raises CaptureError.
+    """
+    place = Path(os.path.realpath(path))
+    if str(path) == "-" or (place.exists() and not place.is_file()):
+        with open_writer(path, file_format, application=application) as writer:
+            yield writer
+        return
+    refuse_other_files(place)
+    beside = place.with_name(f".{place.name}.{os.getpid()}.part")
+    try:
+        with open_writer(beside, file_format, application=application) as writer:
+            yield writer
+        beside.replace(place)
+    except OSError as error:
+        raise CaptureError(f"{path} can not be written: {reason(error)}") from None
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _output(path: Path | str, file_format: str, keeping: Keeping) -> Output:

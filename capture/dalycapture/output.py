@@ -251,8 +251,8 @@ def open_file(
     name = str(path)
     flags = (os.O_RDWR if append else os.O_WRONLY) | os.O_CREAT | os.O_CLOEXEC | os.O_APPEND
     try:
-        if not new and not append and path.exists():
-            _refuse_other_files(path)
+        if not new and not append:
+            refuse_other_files(path)
         fd = os.open(path, flags | (os.O_EXCL if new else 0) | getattr(os, "O_NOCTTY", 0), 0o666)
     except OSError as error:
         raise CaptureError(_cannot_write(path, error)) from None
@@ -314,10 +314,13 @@ def _kind_of(path: Path) -> int | None:
     return mode
 
 
-def _refuse_other_files(path: Path) -> None:
+def refuse_other_files(path: Path) -> None:
+    """See that nothing but a capture is overwritten. Raises CaptureError, OSError."""
     try:
         with path.open("rb") as file:
             magic = file.read(4)
+    except FileNotFoundError:
+        return
     except PermissionError:
         raise CaptureError(f"{path} is there and can not be read; choose another name") from None
     if magic and magic not in CAPTURE_MAGICS:

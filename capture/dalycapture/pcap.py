@@ -15,15 +15,15 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Final
 
+from dalycapture.captured import CapturedPacket, Told
 from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.interface import Interface
 from dalycapture.linktype import link_type_name
 from dalycapture.writer import CaptureWriter, counted
-from dalyref.packet import Packet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dalycapture.interface import Interface
     from dalycapture.output import Output
     from dalycapture.source import Source
 
@@ -83,7 +83,7 @@ class PcapWriter(CaptureWriter):
         """Do nothing: the format has no place for them."""
 
 
-def read_pcap(source: Source) -> Iterator[Packet]:
+def read_pcap(source: Source, told: Told | None = None) -> Iterator[CapturedPacket]:
     """Yield the packets of a classic pcap stream, numbered from 1.
 
     Raises CaptureError where the file is damaged, TruncatedError where it ends in the middle of a packet; what was
@@ -108,6 +108,8 @@ def read_pcap(source: Source) -> Iterator[Packet]:
     )
     *_, link_type = struct.unpack(order + _HEADER, head)
     link_type &= 0xFFFF  # the upper half says how long a frame check sequence is
+    if told:
+        told.interface(Interface(link_type=link_type))
     while head := source.read(16):
         if len(head) < 16:
             raise cut_off("a packet")
@@ -122,7 +124,7 @@ def read_pcap(source: Source) -> Iterator[Packet]:
         if len(data) < captured:
             raise cut_off("a packet")
         number += 1
-        yield Packet(
+        yield CapturedPacket(
             number=number,
             time_ns=seconds * 1_000_000_000 + fraction * unit,
             data=data,

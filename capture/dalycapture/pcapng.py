@@ -32,16 +32,17 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from dalycapture.captured import CapturedPacket, Statistics, Told
 from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.interface import Interface
 from dalycapture.writer import CaptureWriter, counted
-from dalyref.packet import Direction, Packet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dalycapture.interface import Interface
     from dalycapture.output import Output
     from dalycapture.source import Source
+    from dalyref.packet import Direction
 
 SECTION_HEADER: Final = 0x0A0D0D0A
 INTERFACE_DESCRIPTION: Final = 1
@@ -168,6 +169,8 @@ class _Side:
     snap_length: int
     name: str = ""
     description: str = ""
+    hardware: str = ""
+    speed: int = 0
     resolution: int = 6  # if_tsresol
     offset_s: int = 0
 
@@ -180,14 +183,15 @@ class _Side:
 class _Reader:
     """State of reading: the section's byte order and interfaces, and the count of packets over the file."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, told: Told) -> None:
         self.source = source
+        self.told = told
         self.order = "<"
         self.sides: list[_Side] = []
         self.interfaces = 0
         self.number = 0
 
-    def packets(self) -> Iterator[Packet]:
+    def packets(self) -> Iterator[CapturedPacket]:
         while head := self._read(8, at_start=True):
             if head[:4] == b"\x0a\x0d\x0d\x0a":
                 self._section(head)
@@ -202,6 +206,8 @@ class _Reader:
                 yield self._simple(body)
             elif block_type == OBSOLETE_PACKET:
                 yield self._obsolete(body)
+            elif block_type == INTERFACE_STATISTICS:
+                self._statistics(body)
             elif block_type in NUMBERED_BLOCKS:
                 self.number += 1
 
@@ -273,27 +279,46 @@ class _Reader:
                 side.resolution = value[0]
             elif code == IF_TSOFFSET and len(value) == 8:
                 side.offset_s = struct.unpack(self.order + "q", value)[0]
+            elif code == IF_SPEED and len(value) == 8:
+                side.speed = struct.unpack(self.order + "Q", value)[0]
+            elif code == IF_HARDWARE:
+                side.hardware = _decoded(value)
         self.interfaces += 1
         self.sides.append(side)
+        self.told.interface(Interface(side.name, side.description, link_type, side.speed, side.hardware))
+
+    def _statistics(self, body: bytes) -> None:
+        interface: int = struct.unpack_from(self.order + "I", body)[0] if len(body) >= 12 else len(self.sides)
+        if interface >= len(self.sides):
+            return  # no packet depends on it
+        side = self.sides[interface]
+        values: dict[int, int] = {}
+        for code, value in self._options(body, 12):
+            if len(value) == 8:
+                high, low = struct.unpack(self.order + "II", value)
+                at: int = struct.unpack(self.order + "Q", value)[0]
+                values[code] = side.nanoseconds(high << 32 | low) if code in {ISB_START, ISB_END} else at
+        codes = (ISB_START, ISB_END, ISB_RECEIVED, ISB_DROPPED, ISB_OS_DROPPED)
+        self.told.statistics(Statistics(side.number, *(values.get(code) for code in codes)))
 
     def _side(self, interface: int) -> _Side:
         if interface >= len(self.sides):
             raise self._damaged(f"a packet of interface {interface}, which is not described")
         return self.sides[interface]
 
-    def _enhanced(self, body: bytes) -> Packet:
+    def _enhanced(self, body: bytes) -> CapturedPacket:
         if len(body) < 20:
             raise self._damaged("a packet block that is too short")
         interface, high, low, captured, _ = struct.unpack_from(self.order + "IIIII", body)
         return self._made(self._side(interface), high << 32 | low, body, captured)
 
-    def _obsolete(self, body: bytes) -> Packet:
+    def _obsolete(self, body: bytes) -> CapturedPacket:
         if len(body) < 20:
             raise self._damaged("a packet block that is too short")
         interface, _, high, low, captured, _ = struct.unpack_from(self.order + "HHIIII", body)
         return self._made(self._side(interface), high << 32 | low, body, captured)
 
-    def _simple(self, body: bytes) -> Packet:
+    def _simple(self, body: bytes) -> CapturedPacket:
         if len(body) < 4:
             raise self._damaged("a packet block that is too short")
         side = self._side(0)
@@ -302,7 +327,7 @@ class _Reader:
         if 4 + captured > len(body):
             raise self._damaged("a packet longer than its block")
         self.number += 1
-        return Packet(
+        return CapturedPacket(
             number=self.number,
             time_ns=0,  # the block has no time
             data=body[4 : 4 + captured],
@@ -311,20 +336,24 @@ class _Reader:
             link_type=side.link_type,
         )
 
-    def _made(self, side: _Side, ticks: int, body: bytes, captured: int) -> Packet:
+    def _made(self, side: _Side, ticks: int, body: bytes, captured: int) -> CapturedPacket:
         end = 20 + captured
         if end > len(body):
             raise self._damaged("a packet longer than its block")
         comments: list[str] = []
         direction: Direction = ""
+        flags: int = 0
+        dropped: int = 0
         for code, value in self._options(body, end + -captured % 4):
             if code == COMMENT:
                 comments.append(_decoded(value))
             elif code == EPB_FLAGS and len(value) == 4:
-                flags: int = struct.unpack(self.order + "I", value)[0]
+                flags = struct.unpack(self.order + "I", value)[0]
                 direction = DIRECTIONS[flags & 3]
+            elif code == EPB_DROPCOUNT and len(value) == 8:
+                dropped = struct.unpack(self.order + "Q", value)[0]
         self.number += 1
-        return Packet(
+        return CapturedPacket(
             number=self.number,
             time_ns=side.nanoseconds(ticks),
             data=body[20:end],
@@ -333,6 +362,8 @@ class _Reader:
             direction=direction,
             comment="\n".join(comments),
             link_type=side.link_type,
+            flags=flags,
+            dropped=dropped,
         )
 
 
@@ -340,11 +371,11 @@ def _decoded(value: bytes) -> str:
     return value.decode("utf-8", "replace").rstrip("\x00")
 
 
-def read_pcapng(source: Source) -> Iterator[Packet]:
+def read_pcapng(source: Source, told: Told | None = None) -> Iterator[CapturedPacket]:
     """Yield the packets of a pcapng stream, in order, numbered from 1 as Wireshark numbers them.
 
     ``Packet.interface`` counts the interfaces of the whole file, over its sections. A Simple Packet has no time: 0.
     Raises CaptureError where the file is damaged, TruncatedError where it ends in the middle of a block; what was whole
     before that point has been yielded.
     """
-    return _Reader(source).packets()
+    return _Reader(source, told or Told()).packets()

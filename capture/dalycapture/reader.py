@@ -19,7 +19,7 @@ from dalycapture.source import Source
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dalyref.packet import Packet
+    from dalycapture.captured import CapturedPacket, Told
 
 _PCAPNG = b"\x0a\x0d\x0d\x0a"
 _PCAP = frozenset(magic.to_bytes(4, order) for magic in (MICROSECONDS, NANOSECONDS) for order in ("little", "big"))
@@ -34,19 +34,20 @@ _OTHERS = (
 )
 
 
-def read_capture(path: Path | str) -> Iterator[Packet]:
+def read_capture(path: Path | str, told: Told | None = None) -> Iterator[CapturedPacket]:
     """Yield the packets of a capture file, in order, numbered from 1 as Wireshark numbers them.
 
-    path: pcapng or classic pcap, either also gzip-compressed; ``-`` is standard input. Packets of every link type come,
-    with their ``link_type``; DALY_LINK_TYPES (dalycapture.linktype) says which hold our serial bytes. Memory is bounded
-    by one block of at most 16 MiB. Raises CaptureError (one line) when the file is missing, no capture, or damaged, and
-    TruncatedError after the last whole packet when it ends in the middle of one.
+    path: pcapng or classic pcap, either also gzip-compressed; ``-`` is standard input. told: who hears of interfaces
+    and statistics. Packets of every link type come, with their ``link_type``; DALY_LINK_TYPES (dalycapture.linktype)
+    says which hold our serial bytes. Memory is bounded by one block of at most 16 MiB. Raises CaptureError (one line)
+    when the file is missing, no capture, or damaged, and TruncatedError after the last whole packet when it ends in the
+    middle of one.
     """
     name = "standard input" if str(path) == "-" else str(path)
     with ExitStack() as stack:
         try:
             stream = sys.stdin.buffer if str(path) == "-" else stack.enter_context(Path(path).open("rb"))
-            yield from _packets(Source(stream, name))
+            yield from _packets(Source(stream, name), told)
         except FileNotFoundError:
             raise CaptureError(f"{name}: there is no such file") from None
         except IsADirectoryError:
@@ -57,25 +58,25 @@ def read_capture(path: Path | str) -> Iterator[Packet]:
             raise CaptureError(f"{name}: can not be read: {reason(error)}") from None
 
 
-def _packets(source: Source) -> Iterator[Packet]:
+def _packets(source: Source, told: Told | None) -> Iterator[CapturedPacket]:
     if source.peek(2) == _GZIP:
         try:
             with gzip.GzipFile(fileobj=source) as unpacked:  # pyright: ignore[reportArgumentType]
-                yield from _plain(Source(unpacked, source.name))
+                yield from _plain(Source(unpacked, source.name), told)
         except EOFError:
             raise TruncatedError(f"{source.name}: cut off in the middle of its compressed data") from None
         except (gzip.BadGzipFile, zlib.error) as error:
             raise CaptureError(f"{source.name}: its compressed data is damaged: {error}") from None
     else:
-        yield from _plain(source)
+        yield from _plain(source, told)
 
 
-def _plain(source: Source) -> Iterator[Packet]:
+def _plain(source: Source, told: Told | None) -> Iterator[CapturedPacket]:
     magic = source.peek(4)
     if magic == _PCAPNG:
-        yield from read_pcapng(source)
+        yield from read_pcapng(source, told)
     elif magic in _PCAP:
-        yield from read_pcap(source)
+        yield from read_pcap(source, told)
     elif magic and any(whole.startswith(magic) for whole in (_PCAPNG, *_PCAP)):
         raise TruncatedError(f"{source.name}: cut off in the middle of its header, after {len(magic)} bytes")
     else:

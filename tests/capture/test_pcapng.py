@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dalycapture.captured import Statistics, Told
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError, TruncatedError
 from dalycapture.interface import Interface, tap
@@ -167,8 +168,23 @@ def test_python_pcapng_reads_it(sample: Path) -> None:
     flags: list[Any] = [p.options.get("epb_flags") for p in packets]
     assert [bool(f and f.err_crc) for f in flags] == [bool(row.flags & CRC) for row in SAMPLE]
     assert [bool(f and f.err_short) for f in flags] == [bool(row.flags & SHORT) for row in SAMPLE]
+    assert [f.inout if f else "NA" for f in flags] == [("NA", "inbound", "outbound")[row.flags & 3] for row in SAMPLE]
     statistics: Any = next(b for b in blocks if isinstance(b, InterfaceStatistics))
     assert (statistics.options["isb_ifrecv"], statistics.options["isb_ifdrop"]) == (3, 2)
+
+
+def test_we_read_it(sample: Path) -> None:
+    told_interfaces: list[Interface] = []
+    told_statistics: list[Statistics] = []
+    packets = list(read_capture(sample, Told(told_interfaces.append, told_statistics.append)))
+    assert [(p.data, p.time_ns, p.flags, p.comment, p.interface) for p in packets] == [
+        (row.data, row.time_ns, row.flags, row.comment, row.interface) for row in SAMPLE
+    ]
+    assert told_interfaces == [
+        tap("/dev/ttyUSB0", hardware="Acme 485 (1a86:7523)"),
+        Interface(name="b", description="dalyshark bus=main B", link_type=147, speed=9600),
+    ]
+    assert told_statistics == [Statistics(0, SAMPLE[0].time_ns, SAMPLE[-1].time_ns, 3, 2)]
 
 
 def test_scapy_reads_it(sample: Path) -> None:
@@ -179,6 +195,7 @@ def test_scapy_reads_it(sample: Path) -> None:
     assert [data for data, _ in packets] == [row.data for row in SAMPLE]
     assert [(meta.tshigh << 32) + meta.tslow for _, meta in packets] == [row.time_ns for row in SAMPLE]
     assert [meta.tsresol for _, meta in packets] == [10**9] * len(SAMPLE)
+    assert [meta.direction or 0 for _, meta in packets] == [row.flags & 3 for row in SAMPLE]  # all it has of the flags
 
 
 def tshark(path: Path, *words: str) -> list[list[str]]:
