@@ -73,6 +73,11 @@ class WallClock:
         self._slept_ns = slept
         return step
 
+    @property
+    def stepped(self) -> bool:
+        """Whether a step was told of and is not taken over yet."""
+        return self._next_ns != self.offset_ns
+
     def adopt(self) -> None:
         """Go by the newest difference from now on."""
         self.offset_ns = self._next_ns

@@ -232,6 +232,7 @@ class Side:
             if self._wait_s != 0 and can_come_back(self._name):
                 self._replug = Replug(self._port, self._settings, found)
         self._port = None
+        self.tally.away = self._replug is not None
         self._lost_ns = now
         self._unmarker = Unmarker()
 
@@ -254,8 +255,9 @@ class Side:
             return None
         gap = (now - self._lost_ns) / 1e9
         self._replug = None
+        self.tally.away = False
         self._port, self._facts = port, port.facts
-        self._framer.timing.set_latency(port.facts.latency)
+        self._framer.timing.opened(now, port.facts.latency)
         self._before = port.counts()
         self.tally.gap(gap)
         return f"port back after {gap:.3f} s: {'; '.join((port.name, *port.facts.remarks))}"

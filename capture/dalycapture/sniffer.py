@@ -201,6 +201,8 @@ class Sniffer:
                 self._end = self._end or self._limit()
             if self._order:
                 self._write(self._order.due([side.horizon_ns() for side in self._sides]))
+            if self._clock.stepped and not self._order and all(side.quiet for side in self._sides):
+                self._clock.adopt()
             self.tally.seconds = (now - self._started_ns) / 1e9
             if self._end is None and (self._stop_asked or (until is not None and now >= until)):
                 self._end = End.STOPPED if self._stop_asked else End.DURATION
@@ -283,8 +285,6 @@ class Sniffer:
         if step := self._clock.step():
             self.tally.clock_steps += 1
             self._event(self._sides[0], now, str(step))
-        if not self._order and all(side.quiet for side in self._sides):
-            self._clock.adopt()
 
     def _count_line_errors(self, side: Side, now: int) -> None:
         lost = side.tally.lost

@@ -67,6 +67,7 @@ class SideTally:
     marked: int = 0  # bytes marked as received with an error
     breaks: int = 0
     counts: Counts | None = None  # what the driver has counted since the capture began; None: it does not count
+    away: bool = False  # the port is waited for
     gaps_s: list[float] = field(default_factory=list[float])  # the port was away for so long
     gaps: int = 0
     bounds: Spread = field(default_factory=Spread)  # of the records' times

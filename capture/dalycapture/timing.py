@@ -63,14 +63,20 @@ class Timing:
         self._mail_ns = 0
         self._free_ns = 0  # the record before had ended by then
         self._free_floor_ns = 0  # and not before this
-        self.set_latency(latency)
+        self._set_latency(latency)
 
-    def set_latency(self, latency: Latency | None) -> None:
-        """Take another adapter's habits from now on; None: bytes come at once."""
+    def _set_latency(self, latency: Latency | None) -> None:
+        """Take an adapter's habits from now on; None: bytes come at once."""
         self._hold_ns = round(latency.hold_ms * 1e6) if latency else 0
         self._way_ns = round(latency.way_ms * 1e6) if latency else 0
         self._told_ns = self._hold_ns + self._way_ns
         self._learns = latency is not None and latency.learns
+
+    def opened(self, now_ns: int, latency: Latency | None) -> None:
+        """Note that the port was opened again now, perhaps as another adapter: nothing that comes began before."""
+        self._set_latency(latency)
+        self._free_ns = self._mail_ns = now_ns
+        self._free_floor_ns = now_ns - self.delay_ns
 
     @property
     def delay_ns(self) -> int:
@@ -134,6 +140,8 @@ class Timing:
         lowest = max(lowest, self._free_floor_ns - zero)
         consistent = lowest <= highest
         if not consistent:  # the sender paused, or the adapter holds bytes back longer than it says
+            if self._learns and not self._told_ns:  # a pseudo-terminal, whose writer was late himself
+                self._hold_ns = min(self._hold_ns + round(lowest - highest), MOST_LEARNED_NS)
             low = lowest = first.floor_ns - zero - (first.begin - start + 1) * c
             if lowest > highest:  # it did hold this byte back longer, by so much at least
                 lowest = highest - (lowest - highest) - self.delay_ns

@@ -4,31 +4,30 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
 import sys
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.interface import bus_name, tap_of
+from dalycapture.interface import bus_name
 from dalycapture.linktype import DEFAULT_LINK_TYPE, check_link_type
-from dalycapture.port import open_port
-from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally
+from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalycapture.writer import counted
-from dalyref.kinds import Kind
 from dalytools import __version__, file_options
 from dalytools.adapter_list import list_adapters
-from dalytools.port_options import PORT_HELP, add_port_options, checked, settings_of
+from dalytools.capture_summary import summary, write_statistics
+from dalytools.keys import Keys
+from dalytools.listening import Tap, add_listening_options, named, open_sides, taps_of
+from dalytools.port_options import checked
 from dalytools.problem import Problem
+from dalytools.status_line import StatusLine
 
 if TYPE_CHECKING:
-    from dalycapture.framing import TimedRecord
     from dalycapture.rotation import Keeping
     from dalycapture.writer import CaptureWriter
-
-STATUS_EVERY_S = 0.25
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Listen to a serial port and write every record to a capture file. Ctrl-C ends it. Nothing is sent to the bus."
     )
-    parser.add_argument("port", metavar="PORT", nargs="?", help=PORT_HELP)
+    parser.epilog = (
+        "While it runs: m or Enter, or the signal SIGUSR2, puts a mark of yours into the file; SIGUSR1 begins the next "
+        "file (with -b). Exit status: 0 fine, 2 could not run, records were lost, or the port went away for good."
+    )
     parser.add_argument("--list", action="store_true", help="list the serial adapters, without opening any, and end")
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file; - is standard output")
     parser.add_argument(
@@ -67,7 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="147, 148 or 150..162 (default: %(default)s); 149 is taken by another dissector in Wireshark",
     )
     parser.add_argument("-q", "--quiet", action="store_true", help="no status line and no summary")
-    add_port_options(parser)
+    parser.add_argument("--stats", metavar="FILE", help="write the summary as JSON, at the end")
+    add_listening_options(parser)
     file_options.add_arguments(parser)
 
 
@@ -75,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
     """Capture until Ctrl-C, SIGTERM, a limit or the end of the port."""
     if args.list:
         return list_adapters()
-    if not args.port:
+    taps = taps_of(args)
+    if not taps:
         raise Problem("say which PORT to listen to; dalyshark capture --list shows what is there")
     if not args.output:
         raise Problem("say where the capture goes: -w FILE, or -w - for standard output")
@@ -87,17 +91,15 @@ def run(args: argparse.Namespace) -> int:
             limits = replace(limits, **{name: value})
     if args.packets is not None:
         limits = replace(limits, packets=args.packets)
-    status = None if args.quiet or not sys.stderr.isatty() else _Status()
     try:
-        tally, sink = _capture(args, limits, file_options.read(args, stop_after=files), status)
+        tally, sink = _capture(args, taps, limits, file_options.read(args, stop_after=files))
     except CaptureError as error:
         raise Problem(str(error)) from None
-    finally:
-        if status:
-            status.clear()
     tally.notes += sink.notes
     if not args.quiet:
-        print(summary(tally, args.port, args.output, args.baud), file=sys.stderr)  # noqa: T201 - it is for the terminal
+        print(summary(tally, named(taps), args.output, args.baud), file=sys.stderr)  # noqa: T201 - for the terminal
+    if args.stats:
+        write_statistics(args.stats, tally, {"output": args.output})
     if sink.lost:
         raise Problem(
             f"{counted(sink.lost, 'record')} of {tally.records} could not be written: {'; '.join(sink.notes)}"
@@ -108,69 +110,21 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _capture(
-    args: argparse.Namespace, limits: Limits, keeping: Keeping, status: _Status | None
+    args: argparse.Namespace, taps: list[Tap], limits: Limits, keeping: Keeping
 ) -> tuple[Tally, CaptureWriter]:
-    settings = settings_of(args)
-    port = open_port(args.port, settings)
-    try:
-        interface = tap_of(port, settings, bus=args.bus, link_type=args.link_type)
+    with contextlib.ExitStack() as stack:
+        sides = open_sides(args, taps)
+        for side in sides:
+            stack.callback(side.close)
         # After the port: a wrong port does not cost an older capture of the same name.
         sink = open_writer(args.output, args.file_format, application=f"dalyshark {__version__}", keeping=keeping)
-        sniffer = Sniffer([Side(port, interface, settings=settings)], [sink], limits=limits, listener=status)
+        status = None if args.quiet or not sys.stderr.isatty() else StatusLine()
+        sniffer = Sniffer(sides, [sink], limits=limits, ticker=status, verbose=args.verbose)
         if status:
-            status.show(sniffer.tally)
-        return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM)), sink
-    finally:
-        port.close()
-
-
-class _Status:
-    """A line on the terminal that counts along, a few times a second."""
-
-    def __init__(self) -> None:
-        self._tally: Tally | None = None
-        self._next = 0.0
-
-    def show(self, tally: Tally) -> None:
-        """Show this tally from now on."""
-        self._tally = tally
-        text = f"{counted(tally.records, 'record')}, {tally.good} good, {tally.bad} bad, {counted(tally.bytes, 'byte')}"
-        print(f"\r{text}; Ctrl-C ends\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - it is for the terminal
-
-    def __call__(self, _: TimedRecord) -> None:
-        now = time.monotonic()
-        if self._tally and now >= self._next:
-            self._next = now + STATUS_EVERY_S
-            self.show(self._tally)
-
-    def clear(self) -> None:
-        """Take the line away."""
-        if self._tally:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - it is for the terminal
-
-
-def summary(tally: Tally, port: str, output: str, baud: int) -> str:
-    """Say in a paragraph what was heard, and what it looks like when it looks wrong."""
-    kinds = tally.kinds
-    parts = [f"{tally.good} good"]
-    for kind, name in (
-        (Kind.BAD_CHECKSUM, "bad checksum"),
-        (Kind.SHORT, "cut short"),
-        (Kind.FOREIGN, "foreign"),
-        (Kind.JUNK, "junk"),
-    ):
-        if kinds[kind]:
-            parts.append(f"{kinds[kind]} {name}")
-    where = "standard output" if output == "-" else output
-    text = (
-        f"{where}: {counted(tally.records, 'record')} ({', '.join(parts)}), {counted(tally.bytes, 'byte')} "
-        f"in {tally.seconds:.1f} s from {port} at {baud} baud; ended: {tally.end}."
-    )
-    if not tally.bytes:
-        text += " Nothing was heard: is somebody talking on this bus, and is the adapter's receiver wired to A and B?"
-    elif not tally.good and tally.bytes >= 26:
-        text += " No good frame: wrong baud rate, or A and B swapped?"
-    return " ".join([text, *tally.notes])
+            stack.callback(status.clear)
+            keys = stack.enter_context(Keys(sniffer.mark))
+            status.hint = f"  {'m marks, ' if keys.there else ''}Ctrl-C ends"
+        return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM), user_signals=True), sink
 
 
 def _positive(text: str) -> int:

@@ -22,16 +22,17 @@ from typing import TYPE_CHECKING
 
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.interface import bus_name, tap_of
-from dalycapture.port import open_port
+from dalycapture.interface import bus_name
 from dalycapture.reader import read_capture
-from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally
+from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalyref.decoder import Options, decode
 from dalytools import __version__
+from dalytools.capture_summary import side_sentences
 from dalytools.commands.check import SHOWN
 from dalytools.comparison import compare
+from dalytools.keys import Keys
+from dalytools.listening import Tap, add_listening_options, named, open_sides, taps_of
 from dalytools.live_view import LiveView
-from dalytools.port_options import PORT_HELP, add_port_options, settings_of
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.summary import Summary
@@ -68,12 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Ctrl-C ends it. Nothing is sent to the bus. Without PORT: a simulated bus, for 20 s."
     )
     parser.epilog = "Exit status: 0 fine, 1 the two decoders differ, 2 could not run or the port was lost."
-    parser.add_argument("port", metavar="PORT", nargs="?", help=PORT_HELP)
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file (default: captures/daly-TIME.pcapng)")
     parser.add_argument("--duration", type=_seconds, metavar="S", help="stop after so many seconds")
     parser.add_argument("--bus", default="main", help="name of the bus (default: %(default)s)")
     parser.add_argument("-q", "--quiet", action="store_true", help="do not show records, only the summary")
-    add_port_options(parser)
+    add_listening_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         path = _output(args.output)
         screen = _Screen()
         with Tshark() as tshark:
-            bus = None if args.port else _simulated_bus(args.baud)
+            bus = None if taps_of(args) else _simulated_bus(args.baud)
             if bus and args.duration is None:
                 args.duration = SIMULATED_S
             tally = _watch(args, tshark, screen, path, bus)
@@ -147,19 +147,18 @@ def _output(asked: str | None) -> Path:
 
 
 def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path, bus: SimulatedBus | None) -> Tally:
+    taps = [Tap("", bus.tap)] if bus else taps_of(args)
     duration: float | None = args.duration
-    port_name: str = bus.tap if bus else args.port
-    settings = settings_of(args)
-    port = open_port(port_name, settings)
     with contextlib.ExitStack() as stack:
-        stack.callback(port.close)
-        interface = tap_of(port, settings, bus=args.bus)
+        sides = open_sides(args, taps)
+        for side in sides:
+            stack.callback(side.close)
         if not args.output:
             _make_folder(path.parent)
         sinks = [open_writer(path, application=APPLICATION)]
         view, faults = None, list[str]()
         until = f"for {duration:g} s" if duration else "until Ctrl-C"
-        said = plain(f"Listening to {port_name} at {args.baud} baud {until}; writing {path}")
+        said = plain(f"Listening to {named(taps)} at {args.baud} baud {until}; writing {path}")
         screen(f"{said}\n")
         if not args.quiet:
 
@@ -172,18 +171,19 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path
                 screen,
                 ended,
                 options=Options(baud=args.baud),
-                link_type=interface.link_type,
+                link_type=sides[0].interface.link_type,
                 application=APPLICATION,
             )
             stack.callback(view.finish)
             sinks.append(view.sink)
-        sniffer = Sniffer([Side(port, interface, settings=settings)], sinks, limits=Limits(duration=duration))
+        sniffer = Sniffer(sides, sinks, limits=Limits(duration=duration), verbose=args.verbose)
+        stack.enter_context(Keys(sniffer.mark))
         screen.when_gone = sniffer.stop
         if screen.failure:  # nobody reads already
             sniffer.stop()
         if bus:
             stack.enter_context(bus)
-        tally = sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM))
+        tally = sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM), user_signals=True)
     if view and view.sink.failure:  # `ended` has told it better
         with contextlib.suppress(ValueError):
             tally.notes.remove(str(view.sink.broken()))
@@ -248,6 +248,8 @@ def _sum_up(tshark: Tshark, path: Path, tally: Tally, options: Options) -> int:
         print("  Nothing was heard: is somebody talking on this bus, and is the adapter wired to A and B?")  # noqa: T201
     elif not tally.good and tally.bytes >= 26:
         print("  No good frame: wrong baud rate, or A and B swapped?")  # noqa: T201
+    for sentence in (sentence for side in tally.sides for sentence in side_sentences(side)):
+        print(f"  {plain(sentence)}")  # noqa: T201
     for note in tally.notes:
         print(f"  Note: {plain(note)}")  # noqa: T201
     differences = _checked(tshark, path, options) if tally.records else 0
