@@ -20,7 +20,7 @@ import subprocess
 import threading
 from collections import deque
 from dataclasses import dataclass, field
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Protocol
 
 from dalycapture.errors import CaptureError
 from dalycapture.linktype import DALY_LINK_TYPES, TAKEN_LINK_TYPE, link_type_name
@@ -97,18 +97,36 @@ class _Rest:
         self.open = ""
 
 
+class Listener(Protocol):
+    """Who wants to see, besides, what the reference reads: every packet first, then every record."""
+
+    def packet(self, packet: Packet) -> None:
+        """Take a packet."""
+        ...
+
+    def record(self, record: Decoded) -> None:
+        """Take a record."""
+        ...
+
+
 def compare(
-    tshark: Tshark, path: Path, *, options: Options | None = None, progress: Callable[[int], None] | None = None
+    tshark: Tshark,
+    path: Path,
+    *,
+    options: Options | None = None,
+    progress: Callable[[int], None] | None = None,
+    listener: Listener | None = None,
 ) -> Comparison:
     """Compare both readings of a capture file.
 
-    options: the constants for both. progress: called now and then with the number of packets compared. Raises Problem
+    options: the constants for both. progress: called now and then with the number of packets compared. listener: is
+    given all packets of the file, then all records of the reference. Raises Problem
     when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off is compared as
     far as it goes: ``broken``.
     """
     _refuse_pipes(path)
     result = Comparison()
-    wanted = ",".join(str(number) for number in sorted(_link_types(path, result)))
+    wanted = ",".join(str(number) for number in sorted(_link_types(path, result, listener)))
     options = options or Options()
     arguments = [
         *preferences(options),
@@ -124,7 +142,7 @@ def compare(
         arguments += ["-e", name]
     # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
     with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
-        _walk(rows, path, Decoder(options), result, progress)
+        _walk(rows, path, _Told(options, listener), result, progress)
     told = any(difference.field == _LUA_ERROR for difference in result.differences)
     with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
         for row in rows:
@@ -132,6 +150,50 @@ def compare(
             if not told:
                 result.add(Difference(int(values[0]), _LUA_ERROR, values[-1], "none"))
     return result
+
+
+def read_alone(
+    path: Path, *, options: Options | None = None, progress: Callable[[int], None] | None = None, listener: Listener
+) -> Comparison:
+    """Read a capture with the reference decoder alone, where there is no tshark. Arguments and errors as `compare`."""
+    _refuse_pipes(path)
+    result = Comparison()
+    _link_types(path, result, listener)
+    decoder = _Told(options or Options(), listener)
+    for packet in _packets(path):
+        if _is_ours(packet):
+            result.packets += 1
+            _count(decoder.feed(packet), result)
+        if progress and packet.number % 4096 == 0:
+            progress(packet.number)
+    _count(decoder.finish(), result)
+    return result
+
+
+def _count(records: list[Decoded], result: Comparison) -> None:
+    result.records += len(records)
+    for record in records:
+        result.kinds[record.kind] = result.kinds.get(record.kind, 0) + 1
+
+
+class _Told(Decoder):
+    """The reference decoder, its records told to a listener too."""
+
+    def __init__(self, options: Options, listener: Listener | None) -> None:
+        super().__init__(options)
+        self._listener = listener
+
+    def feed(self, packet: Packet) -> list[Decoded]:
+        return self._tell(super().feed(packet))
+
+    def finish(self) -> list[Decoded]:
+        return self._tell(super().finish())
+
+    def _tell(self, records: list[Decoded]) -> list[Decoded]:
+        if self._listener is not None:
+            for record in records:
+                self._listener.record(record)
+        return records
 
 
 def _refuse_pipes(path: Path) -> None:
@@ -180,7 +242,7 @@ def _drain(stream: IO[bytes], into: list[bytes]) -> None:
             kept += len(chunk)
 
 
-def _link_types(path: Path, result: Comparison) -> set[int]:
+def _link_types(path: Path, result: Comparison, listener: Listener | None) -> set[int]:
     """Return the link types of ours in the file, looking at all of it, and whether it reads to its end."""
     ours: set[int] = set()
     others: set[int] = set()
@@ -189,6 +251,8 @@ def _link_types(path: Path, result: Comparison) -> set[int]:
         for packet in read_capture(path):
             packets += 1
             (ours if _is_ours(packet) else others).add(packet.link_type)
+            if listener is not None:
+                listener.packet(packet)
     except CaptureError as error:
         if not packets:
             raise Problem(str(error)) from None
@@ -313,8 +377,8 @@ def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Re
 
 
 _KNOWN = frozenset(FIELD_NAMES)
-# Data IDs beside those of the paper, and Modbus registers, are being taught to both readings, one after the other. Until
-# both know them, what only one of them has is not compared.
+# Data IDs beside those of the paper, and Modbus registers, are being taught to both readings, one after the other.
+# Until both know them, what only one of them has is not compared.
 _COMPARED_YET = frozenset(FIELD_NAMES) - {
     *(f"daly.{name}" for name in SETTINGS.split()),
     "daly.unknown_id",

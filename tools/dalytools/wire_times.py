@@ -5,8 +5,14 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from dalyref.options import Options
+from dalytools.problem import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 _TIMES = ("quiet", "echo", "reply", "burst", "late", "age")
 _TOLERANCES = (
@@ -19,7 +25,9 @@ _TOLERANCES = (
 def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") -> None:
     """Declare one option a constant; ``read`` gives them. quiet: another name, where --quiet means something else."""
     defaults = Options()
-    parser.add_argument("--baud", type=_baud, default=defaults.baud, metavar="N", help="for times on the wire")
+    parser.add_argument(
+        "--baud", type=_baud, default=argparse.SUPPRESS, metavar="N", help=f"for times on the wire ({defaults.baud})"
+    )
     for name, option, text in (
         ("quiet", quiet, "give an incomplete frame up after so long a silence"),
         ("echo", "--echo", "a request repeated within this is an echo"),
@@ -33,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") ->
             option,
             dest=f"{name}_s",
             type=_seconds,
-            default=default,
+            default=argparse.SUPPRESS,
             metavar="S",
             help=f"{text} (seconds, default {default:g})",
         )
@@ -42,17 +50,31 @@ def add_arguments(parser: argparse.ArgumentParser, *, quiet: str = "--quiet") ->
         parser.add_argument(
             f"--{name.replace('_', '-')}",
             type=_whole,
-            default=round(tolerance),
+            default=argparse.SUPPRESS,
             metavar="N",
             help=f"{text} ({unit}, default {tolerance:g})",
         )
 
 
-def read(args: argparse.Namespace) -> Options:
-    """Return the constants that the command line asks for."""
-    times = {name: getattr(args, f"{name}_s") for name in _TIMES}
-    tolerances = {name: getattr(args, name) for name, _, _ in _TOLERANCES}
-    return Options(args.baud, **times, **tolerances)
+def read(args: argparse.Namespace, base: Options | None = None) -> Options:
+    """Return the constants that the command line asks for; those that it does not name are those of `base`."""
+    given: dict[str, object] = vars(args)
+    names = {"baud": "baud", **{name: f"{name}_s" for name in _TIMES}, **{name: name for name, _, _ in _TOLERANCES}}
+    asked = {name: given[there] for name, there in names.items() if there in given}
+    return replace(base or Options(), **asked)  # pyright: ignore[reportArgumentType]
+
+
+def checked(values: Mapping[str, float], said: str) -> Options:
+    """Return constants from a file's words for them. said: what to begin a complaint with. Raises Problem."""
+    made: dict[str, float] = {}
+    for name, value in values.items():
+        try:
+            made[name] = (
+                _baud(str(value)) if name == "baud" else _seconds(str(value)) if name in _TIMES else _whole(str(value))
+            )
+        except argparse.ArgumentTypeError as error:
+            raise Problem(f"{said}{name}: {error}") from None
+    return replace(Options(), **made)  # pyright: ignore[reportArgumentType]
 
 
 def preferences(options: Options) -> list[str]:

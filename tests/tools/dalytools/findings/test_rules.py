@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Every rule finds what was put in, and nothing is found where nothing was."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+from tests.meaning import a5, cells, status
+from tests.tools.dalytools.findings.injected import (
+    BESIDES,
+    CASES,
+    CLEAN,
+    LATER,
+    MOS_OFF,
+    MOS_ON,
+    PACK,
+    Heard,
+    asked,
+    capture,
+    poll,
+    search,
+)
+from tests.tools.dalytools.made import SAMPLES
+
+from dalytools.findings.finding import Severity
+from dalytools.findings.limits import MOST_PLACES, Limits
+from dalytools.findings.rules import RULES
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dalytools.findings.finding import Finding
+
+FROM_MODBUS = {"other-dialect", "modbus-exception", "modbus-ambiguous"}
+"""Rules that need the meaning of Modbus frames."""
+
+
+def one(found: list[Finding], rule: str) -> Finding:
+    (finding,) = (finding for finding in found if finding.rule == rule)
+    return finding
+
+
+def test_every_rule_has_a_case() -> None:
+    assert set(RULES) == set(CASES) | FROM_MODBUS | {"dissector-differs"}
+
+
+def test_a_clean_poll(tmp_path: Path) -> None:
+    assert search(capture(tmp_path / "clean.pcapng", [*CLEAN, *LATER])) == []
+
+
+@pytest.mark.parametrize("rule", CASES)
+def test_what_was_put_in_is_found_and_no_more(rule: str, tmp_path: Path) -> None:
+    found = search(capture(tmp_path / "case.pcapng", [*CASES[rule], *LATER]))
+    assert {finding.rule for finding in found} == {rule} | BESIDES.get(rule, set())
+
+
+def test_a_finding_says_where_when_and_how_often(tmp_path: Path) -> None:
+    at = (0.0, 2.0, 4.0)
+    path = capture(tmp_path / "silent.pcapng", [*(Heard(when, a5(0x41, 0x90)) for when in at), *LATER])
+    silent = one(search(path), "silent")
+    assert silent.severity is Severity.ERROR
+    assert str(silent.place) == "board 2"
+    assert silent.tally.count == 3
+    assert (silent.tally.first_packet, silent.tally.last_packet) == (1, 3)
+    assert (silent.tally.last_ns - silent.tally.first_ns) == 4_000_000_000
+    assert silent.text == "nothing ever answered: 3 requests in 4.0 s"
+    assert silent.advice == "board 1 answers: ask that, or give the board the number that is asked"
+    unanswered = one(search(path), "unanswered")
+    assert str(unanswered.place) == "board 2, 0x90 pack"
+    assert unanswered.text == "3 of 3 requests got no reply in time"
+
+
+def test_a_silent_bluetooth_address_is_told_of_0x40(tmp_path: Path) -> None:
+    """jblance/mpp-solar 113: days of guessing, cured by asking 40."""
+    packets = [Heard(2.0 * number, a5(0x80, 0x90)) for number in range(4)]
+    silent = one(search(capture(tmp_path / "80.pcapng", packets)), "silent")
+    assert str(silent.place) == "address 0x80"
+    assert "ask 0x40 instead" in silent.advice
+
+
+def test_one_finding_a_board_and_id(tmp_path: Path) -> None:
+    packets = [
+        Heard(second + part, a5(host, data_id))
+        for second in range(0, 6, 3)
+        for part, (host, data_id) in enumerate(((0x40, 0x62), (0x40, 0x63), (0x41, 0x62)))
+    ]
+    found = search(capture(tmp_path / "grouped.pcapng", [*packets, *LATER]))
+    places = {str(finding.place): finding.tally.count for finding in found if finding.rule == "unanswered"}
+    assert places == {
+        "board 1, 0x62 software version": 2,
+        "board 1, 0x63 hardware version": 2,
+        "board 2, 0x62 software version": 2,
+    }
+
+
+def test_late_has_a_limit(tmp_path: Path) -> None:
+    path = capture(tmp_path / "late.pcapng", [*CLEAN, *asked(5, 0x90, PACK, after=0.3), *LATER])
+    assert search(path) == []
+    late = one(search(path, Limits(late_s=0.2)), "late")
+    assert late.tally.first_packet == len(CLEAN) + 2
+    assert "later than 200 ms" in late.text
+    assert "0.29 s" in late.text  # 0.3 s from start to start, less the 13.5 ms that the request takes
+
+
+def test_a_reply_after_the_request_was_given_up_is_late_not_unasked(tmp_path: Path) -> None:
+    found = search(capture(tmp_path / "late.pcapng", [*CLEAN, *asked(5, 0x90, PACK, after=3.0), *LATER]))
+    assert {finding.rule for finding in found} == {"late", "unanswered"}
+    assert "1 of them after the request had been given up" in one(found, "late").text
+
+
+def test_a_slow_board_is_not_silent(tmp_path: Path) -> None:
+    packets = [heard for second in range(0, 20, 4) for heard in asked(second, 0x90, PACK, after=1.5)]
+    found = search(capture(tmp_path / "slow.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"late", "unanswered"}
+
+
+def test_wrong_board_names_both(tmp_path: Path) -> None:
+    """Board 1 answers what board 2 was asked, and the right answer follows (thieryus bus.rs)."""
+    packets = asked(5, 0x90, PACK, a5(2, 0x90, "00c6000075300181"), host=0x41)
+    found = search(capture(tmp_path / "wrong.pcapng", [*CLEAN, *packets, *LATER]))
+    assert {finding.rule for finding in found} == {"wrong-board"}
+    assert one(found, "wrong-board").text == "board 1 answered 1 time what board 2 was asked"
+
+
+def test_lengths_of_bursts_are_compared_by_who_asks(tmp_path: Path) -> None:
+    """The app gets 16 frames where the PC gets as many as the cells need (field notes, fact 6): that is no change."""
+    few = [cells(number, 3300, 3300, 3300) for number in (1, 2)]
+    many = [cells(number, 3300, 3300, 3300) for number in range(1, 17)]
+    packets = [
+        heard
+        for second in range(0, 12, 4)
+        for heard in (*asked(second, 0x95, *few), *asked(second + 2, 0x95, *many, host=0x80))
+    ]
+    assert search(capture(tmp_path / "lengths.pcapng", [*packets, *LATER])) == []
+
+
+def test_the_length_may_change_with_the_cell_count(tmp_path: Path) -> None:
+    packets = [
+        *asked(0, 0x94, status(6)),
+        *asked(1, 0x95, *(cells(number, 3300, 3300, 3300) for number in (1, 2))),
+        *asked(2, 0x94, status(9)),
+        *asked(3, 0x95, *(cells(number, 3300, 3300, 3300) for number in (1, 2, 3))),
+    ]
+    assert search(capture(tmp_path / "counts.pcapng", [*packets, *LATER])) == []
+
+
+def test_an_adapter_that_hears_itself_is_no_sleep(tmp_path: Path) -> None:
+    packets = [
+        heard
+        for second in range(4)
+        for heard in (Heard(second, a5(0x40, 0x90)), Heard(second + 0.02, a5(0x40, 0x90)), Heard(second + 0.06, PACK))
+    ]
+    found = search(capture(tmp_path / "loop.pcapng", packets))
+    assert {finding.rule for finding in found} == {"echo"}
+    assert "the adapter or the host hears itself" in one(found, "echo").text
+
+
+def test_a_board_that_falls_silent_sleeps(tmp_path: Path) -> None:
+    packets = [*CLEAN, *(Heard(5 + 2 * number, a5(0x40, 0x90)) for number in range(3)), Heard(40)]
+    found = search(capture(tmp_path / "sleep.pcapng", packets))
+    assert {finding.rule for finding in found} == {"asleep", "unanswered"}
+    assert one(found, "asleep").text == "answered 15 requests, then none of the last 3"
+
+
+def test_damage_below_the_limit_is_a_note(tmp_path: Path) -> None:
+    packets = [*(heard for second in range(20) for heard in poll(second)), Heard(30, "00"), *asked(31, 0x90, PACK)]
+    path = capture(tmp_path / "little.pcapng", packets)
+    assert one(search(path), "damaged").severity is Severity.NOTE
+    assert one(search(path, Limits(damaged_percent=0.01)), "damaged").severity is Severity.WARNING
+
+
+def test_what_the_ends_of_a_capture_cut_is_no_damage(tmp_path: Path) -> None:
+    whole = [*CLEAN, *asked(6, 0x90, PACK)]
+    path = capture(tmp_path / "cut.pcapng", [Heard(-1, PACK[8:]), *whole[:-1], Heard(6.1, PACK[:12])])
+    assert search(path) == []
+
+
+def test_a_write_says_what_and_a_password_is_not_told(tmp_path: Path) -> None:
+    packets = [*CLEAN, Heard(5, MOS_ON), Heard(5.05, a5(1, 0xD9, "01")), Heard(6, MOS_OFF), Heard(6.05, a5(1, 0xD9))]
+    write = one(search(capture(tmp_path / "write.pcapng", packets)), "write")
+    assert str(write.place) == "board 1, 0xD9 discharge MOS"
+    assert write.text.startswith("2 writes: ")
+    assert write.text.count(";") == 1
+
+
+def test_two_buses_are_kept_apart(tmp_path: Path) -> None:
+    packets = [Heard(2.0 * number, a5(0x40, 0x90), interface=number % 2) for number in range(6)] + [
+        Heard(30),
+        Heard(30, interface=1),
+    ]
+    path = capture(tmp_path / "two.pcapng", packets, ("dalyshark bus=left", "dalyshark bus=right"))
+    silent = {str(finding.place): finding.tally.count for finding in search(path) if finding.rule == "silent"}
+    assert silent == {"bus left, board 1": 3, "bus right, board 1": 3}
+
+
+def test_faults_say_what_became_of_them(tmp_path: Path) -> None:
+    packets = [
+        *asked(0, 0x98, a5(1, 0x98, "0100000000001000")),  # cell_volt_high_level_1; the state mos_off_by_command
+        *asked(1, 0x98, a5(1, 0x98, "0300000000000000")),
+        *asked(2, 0x98, a5(1, 0x98)),
+        *asked(3, 0x98, a5(1, 0x98, "0200000000000000")),
+    ]
+    found = search(capture(tmp_path / "faults.pcapng", packets))
+    told = {(finding.rule, finding.place.detail): finding.text for finding in found}
+    assert told == {
+        ("fault-standing", "cell_volt_high_level_1"): "set from the first fault reply on, cleared 1 time",
+        ("fault-raised", "cell_volt_high_level_2"): "raised 2 times, cleared 1 time",
+    }
+
+
+def test_hostile_captures_are_counted_in_bounded_memory(tmp_path: Path) -> None:
+    frames = (a5(0x20 + number % 200, number // 200) for number in range(3000))
+    found = search(
+        capture(tmp_path / "many.pcapng", [*(Heard(n / 50, frame) for n, frame in enumerate(frames)), Heard(100)])
+    )
+    assert sum(finding.rule == "unanswered" for finding in found) == MOST_PLACES + 1
+    assert any(finding.place.detail == "others" for finding in found)
+
+
+MANIFEST = json.loads((SAMPLES / "manifest.json").read_text(encoding="utf-8"))
+CLEAN_SAMPLES = [
+    *(f"made-{name}" for name in ("16-cells-stale", "48-cells", "app-16-frames", "link-type-151", "poll-cycle")),
+    *("made-raw-chunked", "made-two-boards", "real-8s-cpy", "real-poll-cycle"),
+]
+
+
+@pytest.mark.parametrize("name", [entry["file"] for entry in MANIFEST])
+def test_samples(name: str) -> None:
+    """Nothing real is an error; where nothing is wrong, nothing is found. What is wrong in the others, made-* say."""
+    found = search(SAMPLES / name)
+    assert [finding for finding in found if finding.severity is Severity.ERROR] == []
+    stem = name.split(".", maxsplit=1)[0]
+    if stem in CLEAN_SAMPLES:
+        assert found == []
+    expected = {
+        "made-sleeping": {"asleep", "echo", "unanswered", "zero-reply"},
+        "made-faults": {"fault-raised"},
+        "made-events": {"port-lost"},
+        "real-corrupt-lv165": {"damaged", "burst-missing"},
+        "real-sinowealth": {"foreign"},
+        "real-mos-switch": {"write"},
+    }
+    if stem in expected:
+        assert {finding.rule for finding in found} == expected[stem]

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Time stamps as text."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+_NANO = 1_000_000_000
+
+
+def iso(time_ns: int) -> str | None:
+    """Return ns since 1970 as ISO 8601 in UTC with all nine digits; None for a time that no calendar has, or for 0."""
+    seconds, nanos = divmod(time_ns, _NANO)
+    if not time_ns:
+        return None
+    try:
+        return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{nanos:09d}Z"
+    except (OverflowError, OSError, ValueError):
+        return None
+
+
+def clock(time_ns: int) -> str:
+    """Return the local time of day, as ``dalyshark decode`` shows it."""
+    seconds, nanos = divmod(time_ns, _NANO)
+    try:
+        return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S}.{nanos // 1_000_000:03d}"
+    except (OverflowError, OSError, ValueError):
+        return "--:--:--.---"
