@@ -158,13 +158,14 @@ class FileOutput:
 
 
 class PipeOutput:
-    """A pipe, FIFO, socket or character device, never waited for."""
+    """A pipe, FIFO, socket or character device, never waited for, but at its end for goodbye_s seconds."""
 
-    def __init__(self, fd: int, name: str) -> None:
+    def __init__(self, fd: int, name: str, goodbye_s: float | None = None) -> None:
         self.name = name
         self.size = 0
         self._fd = fd
         self._backlog = bytearray()
+        self._goodbye_s = GOODBYE_S if goodbye_s is None else goodbye_s
         self._poll = select.poll()
         self._poll.register(fd, select.POLLOUT)
 
@@ -201,7 +202,7 @@ class PipeOutput:
 
     def close(self) -> None:
         """Give the reader a moment to take the rest, then close. A reader that went away is no error here."""
-        deadline = time.monotonic() + GOODBYE_S
+        deadline = time.monotonic() + self._goodbye_s
         with contextlib.suppress(OSError):
             self.pump()
             while self._backlog and (left := deadline - time.monotonic()) > 0:
