@@ -269,7 +269,7 @@ def test_a_clock_that_is_set_is_an_event(tmp_path: Path) -> None:
     first, event, second = read_capture(path)
     assert event.comment.startswith("clock step: the wall clock was set back by 3600.0")
     assert event.time_ns >= first.time_ns
-    assert 3590 < (event.time_ns - second.time_ns) / 1e9 < 3600
+    assert 3590 < (event.time_ns - second.time_ns) / 1e9 < 3600.02  # thirteen bytes at once: it began before
     assert sniffer.tally.clock_steps == 1
 
 

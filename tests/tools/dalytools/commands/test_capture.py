@@ -266,7 +266,7 @@ def test_a_terminal_gets_a_status_line(bus: Bus, tmp_path: Path) -> None:
         bus.send(numbered(1))
         assert process.wait(30) == 0
         shown = terminal.heard().decode()
-    assert shown.startswith("\r0:00  0.0 records/s  0 good, 0 bad, 0 junk  no board  0.0 kB  0 lost")
+    assert shown.startswith("\r0:00  0.0 records/s  0 good, 0 bad, 0 junk  no board  0.3 kB  0 lost")
     assert shown.endswith(f"\r\x1b[K{tmp_path / 'x.pcapng'}: 1 record (1 good), 13 bytes in " + shown.split(" in ")[-1])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""``dalyshark capture`` while it runs, as a person at a terminal meets it: two taps, marks, the next file, statistics."""
+"""``dalyshark capture`` as a person meets it while it runs: two taps, marks, the next file, statistics."""
 
 from __future__ import annotations
 
