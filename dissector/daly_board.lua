@@ -9,10 +9,11 @@
 
 local results_module = require("daly_results")
 local exchange = require("daly_exchange")
+local settings = require("daly_settings")
 
 local M = {}
 
-local byte, sub, format = string.byte, string.sub, string.format
+local byte, char, sub, format = string.byte, string.char, string.sub, string.format
 local GRACE = exchange.GRACE
 
 local MOST_CELLS, MOST_SENSORS = 48, 21
@@ -150,10 +151,10 @@ end
 local take = {} -- by ID; returns what the frame is shown with, or nil
 
 take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
-  local high, low, _, _, more, less = byte(raw, 5, 10)
+  local high, low, _, _, more, less, soc_high, soc_low = byte(raw, 5, 12)
   board.current = more * 256 + less
   local mine = keep(board, "pack", packet, ends)
-  mine.raw = high * 256 + low
+  mine.raw, mine.soc = high * 256 + low, soc_high * 256 + soc_low
   local cells = board.all_cells
   if is_new(bus, cells, starts) then
     compare_sum(bus, slot, mine, cells, cells, "the newest table of 0x95")
@@ -233,6 +234,48 @@ take[0x98] = function(bus, board, slot, packet, raw)
   end
   board.faults, board.faults_in = data, packet
   return before
+end
+
+-- What a read of settings tells is remembered for the write that may change it.
+local function take_setting(_, board, _, packet, raw)
+  local id = byte(raw, 3)
+  board.settings = board.settings or {}
+  board.settings[id] = sub(raw, 5, 12)
+  board.settings[-id] = packet
+end
+
+for id = 0x50, 0x6A do
+  if settings.READS[id] and #settings.READS[id] > 0 then
+    take[id] = take_setting
+  end
+end
+
+--- A request that writes: what its board had before, as the bytes of such a request (daly_results). `address`: the
+-- board it names, or nil: then the bus's only one.
+function M.note_before(bus, slot, address, id)
+  local all = bus.state.boards
+  local board = address and all[address]
+  if not address then
+    local only = next(all)
+    board = only and not next(all, only) and all[only]
+  end
+  if not board then
+    return
+  end
+  local was, was_in
+  if (id == 0xD9 or id == 0xDA) and board.mos_in then
+    local on = id == 0xDA and board.charge or id == 0xD9 and board.discharge
+    was, was_in = (on and "\1" or "\0") .. ("\0"):rep(7), board.mos_in
+  elseif id == 0x21 and board.pack then
+    local soc = board.pack.soc
+    was, was_in = ("\0"):rep(6) .. char(math.floor(soc / 256), soc % 256), board.pack.packet
+  elseif board.settings and board.settings[id + 0x40] then
+    was, was_in = board.settings[id + 0x40], board.settings[-id - 0x40]
+  end
+  if was then
+    local odd = results_module.odd(bus.results, slot)
+    odd.was, odd.was_in = was, was_in
+  end
 end
 
 --- A reply that is one frame. Returns what it is shown with (daly_results), or nil.

@@ -60,9 +60,12 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
   -- Something for every frame: columns without gaps are lists, which take less room and time.
   if address >= 0x20 then
     link[slot], wait[slot], memory[slot] = false, ends, bus
-    local flag = exchange.ask(bus, slot, number, raw, address, id, starts, ends, side)
+    local flag, board, writes = exchange.ask(bus, slot, number, raw, address, id, starts, ends, side)
     if flag then
       results.flag[slot] = flag
+    end
+    if writes then
+      boards.note_before(bus, slot, board, id)
     end
     if flag ~= "echo" then
       local burst = state.burst

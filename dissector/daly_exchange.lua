@@ -70,7 +70,7 @@ local function remember(state, id, request, late)
   list.first, list.last = first, last
 end
 
---- A request. Returns "echo", "retry" or nil.
+--- A request. Returns "echo", "retry" or nil; and, of one that writes, the board it names (or nil) and true.
 function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
   local state, times = bus.state, bus.times
   local flag
@@ -113,7 +113,7 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     odd_of(bus.results, slot).second_host = true
   end
   state.host, state.host_ended, state.any = host, ends, true
-  return flag
+  return flag, request.board, request.data ~= nil
 end
 
 -- What the reply to a write says of it.

@@ -10,20 +10,7 @@ local double, text, boolean = types.double, types.text, types.boolean
 
 local M = {}
 
-local BATTERY = { [0] = "LFP", [1] = "ternary", [2] = "LTO" }
-local PRESS = { [1] = "long press", [2] = "short press" }
-local INVERTER = {
-  [0] = "none",
-  [1] = "Pylon",
-  [2] = "Growatt",
-  [3] = "Sofar",
-  [4] = "Voltronic",
-  [5] = "GoodWe",
-  [6] = "SRNE",
-  [7] = "MUST",
-  [8] = "Victron",
-}
-local INVERTER_BUS = { [0] = "RS485", [1] = "CAN" }
+local NAMES = require("daly_settings").NAMES
 
 -- stylua: ignore start
 
@@ -41,8 +28,8 @@ function M.declare(add)
   add("setting.sensors_3", "setting.sensors_3", plain(ProtoField.uint16, "Sensors of board 3", "Sensors of acquisition board 3; 0x51 byte 6, D2 88 [seen by several]"))
   add("total.charged", "total.charged", plain(ProtoField.uint32, "Charged in all", "Charge taken in so far, Ah; 0x52 bytes 0-3 [seen by several]"))
   add("total.discharged", "total.discharged", plain(ProtoField.uint32, "Discharged in all", "Charge given so far, Ah; 0x52 bytes 4-7 [seen by several]"))
-  add("setting.battery_type", "setting.battery_type", named("Battery type", BATTERY, "0 LFP, 1 ternary, 2 LTO; 0x53 byte 0, D2 89 [contradicted in 0x53: one source has bytes 0 and 1 the other way round]"))
-  add("setting.operating_mode", "setting.operating_mode", named("Operating mode", PRESS, "1 long press, 2 short press; 0x53 byte 1 [contradicted: one source has bytes 0 and 1 the other way round]"))
+  add("setting.battery_type", "setting.battery_type", named("Battery type", NAMES.battery_type, "0 LFP, 1 ternary, 2 LTO; 0x53 byte 0, D2 89 [contradicted in 0x53: one source has bytes 0 and 1 the other way round]"))
+  add("setting.operating_mode", "setting.operating_mode", named("Operating mode", NAMES.operating_mode, "1 long press, 2 short press; 0x53 byte 1 [contradicted: one source has bytes 0 and 1 the other way round]"))
   add("production_date", "production_date", text("Production date", "20YY-MM-DD; 0x53 bytes 2-4, D2 CC, 81 129 [contradicted in 0x53; seen by several in Modbus]"))
   add("setting.sleep", "setting.sleep", plain(ProtoField.uint16, "Sleep after", "Time without current before sleep, s; 0x53 bytes 5-6, D2 8A [contradicted in 0x53: one source has byte 5 in minutes]"))
   add("setting.current_drift", "setting.current_drift", double("Current drift", "Current taken for zero, A; 0x53 byte 7, 0.1 A [seen once]"))
@@ -93,8 +80,8 @@ function M.declare(add)
   add("setting.balancer", "setting.balancer", boolean("Balancer", "Active balancer on; 0x67 byte 0, D2 CF, 81 119 [seen by several]"))
   add("setting.series_count", "setting.series_count", number("Cells in series", "Cells in series, as set for the balancer; 0x68 byte 0 [seen once]"))
   add("setting.balance_current_raw", "setting.balance_current_raw", plain(ProtoField.uint16, "Balance current, raw", "Balance current, unit not known; 0x68 bytes 1-2 [seen once]"))
-  add("setting.inverter", "setting.inverter", named("Inverter", INVERTER, "Kind of inverter it speaks with; 0x69 byte 0 [seen once]"))
-  add("setting.inverter_bus", "setting.inverter_bus", named("Inverter bus", INVERTER_BUS, "0 RS485, 1 CAN; 0x69 byte 1 [seen once]"))
+  add("setting.inverter", "setting.inverter", named("Inverter", NAMES.inverter, "Kind of inverter it speaks with; 0x69 byte 0 [seen once]"))
+  add("setting.inverter_bus", "setting.inverter_bus", named("Inverter bus", NAMES.inverter_bus, "0 RS485, 1 CAN; 0x69 byte 1 [seen once]"))
   add("setting.mos_charge", "setting.mos_charge", boolean("Charge MOS switch", "Charge MOS as switched: on or off; 0xDA byte 0 (request and reply), D2 A5, 81 121, HKMS 182A [contradicted by the article, which has 00 for on; seen by several]"))
   add("setting.mos_discharge", "setting.mos_discharge", boolean("Discharge MOS switch", "Discharge MOS as switched: on or off; 0xD9 byte 0 (request and reply), D2 A6, 81 122, HKMS 182C [contradicted by the article, which has 00 for on; seen by several]"))
   add("setting.soc", "setting.soc", double("SOC to set", "State of charge to set, %; 0x21 bytes 6-7, D2 A7, 81 116, HKMS 161E and 181E [seen by several]"))

@@ -1,10 +1,11 @@
 -- SPDX-License-Identifier: GPL-2.0-or-later
 --
--- The eight data bytes of a reply, by data ID (paper, section 3): as fields of the tree, and as words for the Info
--- column. All numbers of several bytes are big-endian.
+-- The eight data bytes of a reply, by data ID (paper, section 3; others: daly_settings): as fields of the tree, and as
+-- words for the Info column. All numbers of several bytes are big-endian.
 --
 --   M.show[id](frame, out, from)   adds the fields; from: packet of the record before, of a changed 0x98
 --   M.words[id](frame)             returns the words
+--   M.show_write, M.write_words    the same of a request that writes
 --
 -- `frame` = { raw = its 13 bytes, memory = what the bus remembered for it, table = list of all cells or sensors of its
 -- burst, text = all of its burst, or nil }; data byte 0 is the fifth byte of raw. `out` adds:
@@ -18,11 +19,14 @@ local fields = require("daly_fields").fields
 local STATE = require("daly_fields").STATE
 local faults = require("daly_faults")
 local bursts = require("daly_bursts")
+local quantities = require("daly_quantities")
+local settings = require("daly_settings")
 
 local M = { show = {}, words = {} }
 local show, words = M.show, M.words
 
 local byte, format, floor, concat = string.byte, string.format, math.floor, table.concat
+local printable = quantities.printable
 
 local function state_name(state)
   return STATE[state] or format("state %d", state)
@@ -197,11 +201,6 @@ local function real_slots(burst, frame, per_frame)
     return per_frame, first
   end
   return math.max(0, math.min(per_frame, burst.count - first)), first
-end
-
--- A text's bytes as they can be shown.
-local function printable(bytes)
-  return (bytes:gsub("[^\x20-\x7E]", "?"))
 end
 
 --- What this frame carries of its whole burst: the list of all cells (mV) or sensors (raw), the text; nil, nil where
@@ -463,46 +462,133 @@ for id in pairs(bursts.IDS) do
   words[id] = words[id] or text_words
 end
 
--- Requests that write: what they would change, byte by byte where that is known (field notes a.3).
-local function switches(what)
-  return function(raw)
-    local value = byte(raw, 5)
-    if value > 1 then
-      return format("%s to %d", what, value)
+-- Other IDs: settings and the like (daly_settings).
+
+-- Each value of a list in data, as { label, words }; values that are none are left out.
+local function values_of(list, raw, at)
+  local told = {}
+  for i = 1, #list do
+    local name, first, length, kind, unit, names = table.unpack(list[i], 1, 6)
+    local value = quantities.read[kind](raw, at + first, length)
+    if value ~= nil then
+      told[#told + 1] = { quantities.label(name), quantities.words(kind, value, unit, names) }
     end
-    -- 01 is on on every device seen; the vendor's article of 2024 has it the other way round.
-    return format("switches the %s %s", what, value == 1 and "on" or "off")
+  end
+  return told
+end
+
+local function show_values(list, raw, out)
+  for i = 1, #list do
+    local name, first, length, kind, unit = table.unpack(list[i], 1, 5)
+    local value = quantities.read[kind](raw, 5 + first, length)
+    if value ~= nil then
+      out.value(fields[name], first, length, value, unit)
+    end
   end
 end
 
-local WRITES = {
-  [0x00] = function()
-    return "restarts the board"
-  end,
-  [0xD9] = switches("discharge MOS"),
-  [0xDA] = switches("charge MOS"),
-  [0x21] = function(raw)
-    local _, _, _, _, year, month, day, hour, minute, second, high, low = byte(raw, 1, 12)
-    return format(
-      "sets the clock to %02d-%02d-%02d %02d:%02d:%02d, SOC to %.1f %%",
-      year,
-      month,
-      day,
-      hour,
-      minute,
-      second,
-      (high * 256 + low) / 10
-    )
-  end,
-}
+local function hex_of(raw)
+  return (
+    raw
+      :sub(5, 12)
+      :gsub(".", function(one)
+        return format("%02x ", byte(one))
+      end)
+      :sub(1, -2)
+  )
+end
 
---- What a request that writes would change, in words.
-function M.write_words(id, raw)
-  local known = WRITES[id]
-  if known then
-    return known(raw)
+for id, list in pairs(settings.READS) do
+  local level, class = settings.alarm(id)
+  show[id] = function(frame, out)
+    if level then
+      out.made(fields["alarm.level"], level)
+      out.made(fields["alarm.class"], class)
+    end
+    show_values(list, frame.raw, out)
   end
-  return format("sets what 0x%02X reads", id + 0x40)
+  words[id] = function(frame)
+    local told = values_of(list, frame.raw, 5)
+    if #told == 0 then
+      return hex_of(frame.raw)
+    end
+    for i = 1, #told do
+      told[i] = told[i][1] .. " " .. told[i][2]
+    end
+    return concat(told, "  ")
+  end
+end
+
+local NOTHING = ("\0"):rep(8)
+
+words[0xD8] = function(frame)
+  local list = {}
+  for _, one in ipairs(values_of(settings.READS[0xD8], frame.raw, 5)) do
+    if one[2] == "on" then
+      list[#list + 1] = one[1]
+    end
+  end
+  return #list > 0 and "woken by " .. concat(list, ", ")
+    or frame.raw:sub(5, 12) == NOTHING and "none"
+    or hex_of(frame.raw)
+end
+
+-- Requests that write (docs/protocol.md a.3).
+
+--- The fields of what a request would set.
+function M.show_write(id, raw, out)
+  local command = settings.COMMANDS[id]
+  if command then
+    out.made(fields.command, command)
+  elseif settings.WRITES[id] then
+    show_values(settings.WRITES[id], raw, out)
+  end
+end
+
+local RESTART = 0x00
+
+-- Every device seen has 01 for on; the vendor's article of 2024 has it the other way round.
+local REVERSE = " (01 is on, as every device seen has it; the vendor's article of 2024 says 00)"
+
+--- What a request that writes would change, in words, short and in full. `was`: what the board had before, the same
+-- eight bytes, and `was_in`: the packet that told; nil where nothing is known.
+function M.write_words(id, raw, was, was_in)
+  if id == RESTART then
+    return "restarts the board", "restarts the board"
+  end
+  local list = settings.WRITES[id] or {}
+  local told, before = values_of(list, raw, 5), {}
+  if #told == 0 then
+    local text = format("sets what 0x%02X reads, to %s", id + 0x40, hex_of(raw))
+    return text, text
+  end
+  for _, one in ipairs(was and values_of(list, was, 1) or {}) do
+    before[one[1]] = one[2]
+  end
+  local sets, differs = {}, {}
+  for i = 1, #told do
+    local label, value = told[i][1], told[i][2]
+    sets[i] = format("%s to %s", label, value)
+    if before[label] and before[label] ~= value then
+      differs[#differs + 1] = format("%s was %s", label, before[label])
+    end
+  end
+  local text
+  if id == 0xD9 or id == 0xDA then
+    text = format("switches the %s %s", told[1][1], told[1][2])
+  else
+    text = "sets " .. concat(sets, ", ")
+  end
+  local full = text
+  if id == 0xD9 or id == 0xDA then
+    full = full .. REVERSE
+  end
+  if #differs > 0 then
+    full = format("%s; by packet %d, %s", full, was_in, concat(differs, ", "))
+  elseif was then
+    full = format("%s; the same as in packet %d", full, was_in)
+  end
+  return text, full
 end
 
 --- What is to be said of a reply's content: a list of { expert's name, words }.

@@ -20,7 +20,8 @@
 --   flag       "echo" or "retry"
 --   whole_in   first frame of a burst: packet that has the burst's table
 --   odd        { unasked =, late_to =, other_board =, second_host =, result =, cut_off =, changed = { names }, from =,
---                contradictions = { name, packet, words, name, packet, words, ... } }, as in docs/records.md 7 to 11
+--                contradictions = { name, packet, words, name, packet, words, ... } }, as in docs/records.md 7 to 11;
+--              of a write also was =, was_in =: what it would change, as such a write's bytes, and the packet that told
 
 local M = {}
 

@@ -24,7 +24,10 @@ Report.__index = Report
 
 --- An empty report.
 function M.new()
-  return setmetatable({ kinds = {}, rows = {}, records = 0, bytes = 0, boards = {}, requests = {} }, Report)
+  return setmetatable(
+    { kinds = {}, rows = {}, records = 0, bytes = 0, boards = {}, unknown = {}, requests = {} },
+    Report
+  )
 end
 
 -- The row of a board (0: none is named) and an ID.
@@ -49,6 +52,9 @@ function Report:record(pinfo, kind, raw, slot, _, results)
     return
   end
   local address, id = byte(raw, 2, 3)
+  if kind == "frame" and not DATA_IDS[id] then
+    self.unknown[id] = (self.unknown[id] or 0) + 1
+  end
   local row = row_of(self, addresses.board(address), id)
   if kind == "bad_checksum" then
     row.damaged = row.damaged + 1
@@ -94,7 +100,7 @@ local function spread(times)
   return times[1] * 1000, sum / #times * 1000, p95 * 1000, times[#times] * 1000
 end
 
-local COLUMNS = "%-5s %-19s %7s %7s %6s %6s %6s %6s  %8s %8s %8s %8s"
+local COLUMNS = "%-5s %-23s %7s %7s %6s %6s %6s %6s  %8s %8s %8s %8s"
 
 --- The report as text.
 function Report:text()
@@ -118,6 +124,15 @@ function Report:text()
     end
   end
   lines[2] = #boards > 0 and "boards that answer: " .. concat(boards, ", ") or "no board answers"
+  local unknown = {}
+  for id = 0, 0xFF do
+    if self.unknown[id] then
+      unknown[#unknown + 1] = format("0x%02X (%d)", id, self.unknown[id])
+    end
+  end
+  if #unknown > 0 then
+    lines[3] = "frames with an unknown data ID: " .. concat(unknown, ", ")
+  end
   local rows = {}
   for _, row in pairs(self.rows) do
     rows[#rows + 1] = row
@@ -127,7 +142,7 @@ function Report:text()
   end)
   if #rows > 0 then
     lines[#lines + 1] = ""
-    lines[#lines + 1] = "                                                                     response time, ms"
+    lines[#lines + 1] = "                                                                         response time, ms"
     lines[#lines + 1] = format(
       COLUMNS,
       "board",
@@ -157,7 +172,7 @@ function Report:text()
     lines[#lines + 1] = format(
       COLUMNS,
       row.board and format("%d", row.board) or "any",
-      format("0x%02X %s", row.id, DATA_IDS[row.id] or ""),
+      format("0x%02X %s", row.id, DATA_IDS[row.id] or "unknown ID"),
       format("%d", row.requests),
       format("%d", row.replies),
       format("%d", missing[row] or 0),

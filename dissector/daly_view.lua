@@ -145,8 +145,7 @@ local function host_name(address)
 end
 
 local function id_words(id)
-  local name = data_ids[id]
-  return name and format("0x%02X %s", id, name) or format("0x%02X", id)
+  return format("0x%02X %s", id, data_ids[id] or "unknown ID")
 end
 
 -- The constant part of a frame's words, by address * 256 + ID.
@@ -183,8 +182,8 @@ end
 
 local frame = {} -- the one at hand, for daly_payload
 
--- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and destination,
--- board = function(raw), show = function(raw): fields of its head }. nil: an A5 frame.
+-- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and
+-- destination, board = function(raw), show = function(raw): fields of its head }. nil: an A5 frame.
 local carrier
 
 -- What a frame's rare things say (daly_results' odd): expert notes.
@@ -259,8 +258,12 @@ local function request(item, raw, slot, id, flag, text)
     item:add_proto_expert_info(experts.echo)
   else
     if exchange.is_write(id) then
-      local words = byte(raw, 4) == 8 and payload.write_words(id, raw) or "not of eight bytes"
-      item:add_proto_expert_info(experts.write, "WRITE: " .. words)
+      local odd = results.odd[slot]
+      local words, full = "not of eight bytes", "not of eight bytes"
+      if byte(raw, 4) == 8 then
+        words, full = payload.write_words(id, raw, odd and odd.was, odd and odd.was_in)
+      end
+      item:add_proto_expert_info(experts.write, "WRITE: " .. full)
       text = format("WRITE%s: %s", text:gsub("^Request", ""), words)
     end
     if flag == "retry" then
@@ -276,6 +279,9 @@ local function request(item, raw, slot, id, flag, text)
   if wanted then
     if flag ~= "echo" and exchange.is_write(id) then
       made(fields.write, true)
+      if byte(raw, 4) == 8 then
+        payload.show_write(id, raw, out)
+      end
     end
     if flag == "retry" then
       made(fields.retry, true)
@@ -319,6 +325,9 @@ local function a5(item, raw, slot)
     made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
     if board then
       made(fields.board, board)
+    end
+    if not data_ids[id] then
+      made(fields.unknown_id, true)
     end
     local link = results.link[slot]
     if link then
@@ -542,8 +551,8 @@ function M.several(parent, buffer, raw, items, pinfo)
 end
 
 --- A packet that is one record of `kind`, whose `length` bytes stand at the buffer's beginning. `show(item, thing,
--- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source, destination;
--- `raw` and `slot`: for daly_stat.
+-- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source,
+-- destination; `raw` and `slot`: for daly_stat.
 function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing)
   local node = begin(parent, buffer, 0, length, kind)
   at = -4

@@ -66,9 +66,17 @@ WORDS: dict[str, dict[int, str]] = {
     "cut off by time": {2: "Burst is cut off"},
     "state and switches": {3: "state, discharge mos"},
     "faults": {3: "Raised: cell_volt_high_level_2, cell_volt_low_level_2"},
-    "MOS switches": {1: "WRITE: switches the charge MOS on", 3: "switches the discharge MOS off", 4: "denies"},
+    "MOS switches": {
+        1: "WRITE: switches the charge MOS on (01 is on,",
+        3: "switches the discharge MOS off",
+        4: "denies",
+    },
     "clock and SOC": {1: "23-08-23 18:00:00, SOC to 50.0 %"},
-    "settings and restart": {1: "sets what 0x50 reads", 5: "restarts the board"},
+    "settings and restart": {
+        1: "WRITE: sets rated capacity to 300000 mAh, cell nominal voltage to 3300 mV",
+        3: "WRITE: sets what 0x6A reads, to 01 00 00 00 00 00 00 00",
+        5: "restarts the board",
+    },
     "91 beyond 20 mV of the cells": {3: "Highest cell is 3341 mV here, 3320 mV in the newest table of 0x95 (packet 2)"},
     "pack voltage within 1 % of the cells": {5: "Pack voltage is 10.2 V, the cells sum up to 10.000 V"},
     "cells that the board does not have": {3: "Number 4, and there are 3 by 0x94 (packet 2)"},
@@ -83,7 +91,7 @@ def test_it_is_said_in_words(sessions: dict[str, list[Row]], name: str) -> None:
 
 
 def test_writes_and_unanswered_requests_stand_out_in_the_list(sessions: dict[str, list[Row]]) -> None:
-    assert info(sessions["MOS switches"][0]) == "WRITE board 1  0xDA: switches the charge MOS on"
+    assert info(sessions["MOS switches"][0]) == "WRITE board 1  0xDA Charge MOS: switches the charge MOS on"
     assert info(sessions["late"][0]).endswith("[unanswered]")
     assert 'all: "DL-BMS-R32-01E"' in info(sessions["a text"][1])
 

@@ -48,7 +48,7 @@ def rows(text: str) -> dict[tuple[str, str], list[str]]:
     found: dict[tuple[str, str], list[str]] = {}
     for line in text.splitlines():
         if line[6:8] == "0x":
-            found[line[:5].strip(), line[6:10]] = line[26:].split()
+            found[line[:5].strip(), line[6:10]] = line[30:].split()
     return found
 
 
@@ -77,6 +77,12 @@ def test_requests_and_replies(tshark: Tshark, passes: tuple[str, ...]) -> None:
         ("1", "0x90"): ["3", "2", "1", "1", "1", "1", "50.0", "75.0", "100.0", "100.0"],
         ("any", "0x93"): ["1", "0", "1", "0", "0", "0"],
     }
+
+
+def test_unknown_ids_are_counted(tshark: Tshark) -> None:
+    packets = [P(a5(0x40, 0xAB), 0), P(a5(1, 0xAB), 0.05), P(a5(1, 0x0F), 1), P(a5(1, 0x90), 2)]
+    text = ask(tshark, capture(tshark, packets), "daly,stat")
+    assert "\nframes with an unknown data ID: 0x0F (1), 0xAB (2)\n" in text
 
 
 def test_a_filter_picks_packets(tshark: Tshark) -> None:

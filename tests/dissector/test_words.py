@@ -31,7 +31,27 @@ CASES = {
     "a50197089000000000000000d5": "Reply board 1  0x97 Balance: cells 5 8",
     "a5019708000000000000000045": "Reply board 1  0x97 Balance: none",
     "a5019808000000000000000046": "Reply board 1  0x98 Faults: none",
-    "a501d808000000000000000086": "Reply board 1  0xD8  00 00 00 00 00 00 00 00",
+    "a501d808000000000000000086": "Reply board 1  0xD8 Wake-up: none",
+    a5(1, 0xD8, "0100000101"): "Reply board 1  0xD8 Wake-up: woken by key, CAN, current",
+    a5(1, 0x50, "0000753000000e10"): (
+        "Reply board 1  0x50 Ratings: rated capacity 30000 mAh  cell nominal voltage 3600 mV"
+    ),
+    a5(1, 0x53, "00021a0602 0e10 03".replace(" ", "")): (
+        "Reply board 1  0x53 Battery: battery type LFP  operating mode short press  production date 2026-06-02"
+        "  sleep 3600 s  current drift 0.3 A"
+    ),
+    a5(1, 0x5B, "74cc 7490 7594 75d0".replace(" ", "")): (
+        "Reply board 1  0x5B Current limits: charge current 1 -10.0 A  charge current 2 -16.0 A"
+        "  discharge current 1 10.0 A  discharge current 2 16.0 A"
+    ),
+    a5(1, 0x54, b"20220810".hex()): 'Reply board 1  0x54 Firmware index: firmware index "20220810"',
+    a5(1, 0x58, "1a0602"): "Reply board 1  0x58 Production: 1a 06 02 00 00 00 00 00",
+    a5(1, 0x67, "01"): "Reply board 1  0x67 Balancer: balancer on",
+    a5(1, 0x79, "0e42 0064 0ddb 00c8".replace(" ", "")): (
+        "Reply board 1  0x79 Alarm 2 cell high: value 3650 mV  delay 1.00 s  recovery 3547 mV  recovery delay 2.00 s"
+    ),
+    a5(1, 0xD9, "01 0d130d210d17c0".replace(" ", "")): "Reply board 1  0xD9 Discharge MOS: discharge MOS on",
+    a5(1, 0xAB, "01"): "Reply board 1  0xAB unknown ID  01 00 00 00 00 00 00 00",
     a5(0x11, 0x90): "Reply unknown board  0x90 Pack: 0.0 V  -3000.0 A  SOC 0.0 %",
     "a5019508021c000076560286b0": "Bad checksum  address 0x01  0x95 Cell voltages",
     "a501950802": "Cut-off frame  5 bytes  a5 01 95 08 02",
