@@ -26,7 +26,7 @@ COMMANDS = {
     "decode": "show what the reference decoder reads in a capture",
     "check": "hold the Wireshark dissector against the reference decoder",
     "reframe": "cut an old capture, or a raw log, into records again",
-    "install": "the dissector and the profile into Wireshark's personal folders",
+    "install": "dissector, profile and capture tool into Wireshark's personal folders",
     "uninstall": "take them away again",
     "doctor": "what is there, what is missing, and how to get it",
     "simulate": "a bus with boards and a host on pseudo-terminals",

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
 from dalytools.bundle import NAME, bundle
+from dalytools.extcap_wrapper import wrapper, wrapper_name
 from dalytools.problem import Problem
 from dalytools.tshark import dissector_folder
 
@@ -74,7 +75,7 @@ class Installation:
         for path, content in self._parts().items():
             step = self._step(path, content, known)
             if step in (Step.WRITE, Step.REPLACE) and not self.dry_run:
-                _write(path, content)
+                _write(path, content, executable=path == self.tool)
                 known[str(path)] = _digest(content)
             elif step is Step.SAME:
                 known[str(path)] = _digest(content)
@@ -115,6 +116,11 @@ class Installation:
         quiet = Installation(self.folders, dry_run=True)
         return [Done(quiet._step(path, content, known), path) for path, content in self._parts().items()]
 
+    @property
+    def tool(self) -> Path:
+        """Where the capture tool is."""
+        return self.folders.extcap / wrapper_name()
+
     def others(self) -> list[Path]:
         """Find dissectors of ours in the plugin folder that this program did not put there."""
         ours = self.folders.plugins / NAME
@@ -124,7 +130,7 @@ class Installation:
     def _parts(self) -> dict[Path, bytes]:
         source = dissector_folder()
         try:
-            parts = {self.folders.plugins / NAME: bundle(source).encode()}
+            parts = {self.folders.plugins / NAME: bundle(source).encode(), self.tool: wrapper()}
             for file in sorted((source / "profile").iterdir()):
                 if file.is_file():
                     parts[self.folders.profiles / PROFILE / file.name] = file.read_bytes()
@@ -139,7 +145,7 @@ class Installation:
             return Step.WRITE
         there = path.read_bytes()
         if there == content:
-            return Step.SAME
+            return Step.SAME if path != self.tool or os.access(path, os.X_OK) else Step.REPLACE
         if known.get(str(path)) == _digest(there):
             return Step.REPLACE
         what = "was changed since it was installed" if str(path) in known else "is there and not ours"
@@ -158,7 +164,7 @@ class Installation:
             return {}
         if not isinstance(told, dict):
             return {}
-        inside = (self.folders.plugins, self.folders.profiles / PROFILE)
+        inside = (self.folders.plugins, self.folders.profiles / PROFILE, self.folders.extcap)
         items = cast("Iterable[tuple[object, object]]", told.items())  # pyright: ignore[reportUnknownMemberType]
         # A record that somebody wrote does not make us touch other folders.
         return {str(name): str(digest) for name, digest in items if Path(str(name)).parent in inside}
@@ -171,13 +177,15 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write(path: Path, content: bytes, *, executable: bool = False) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             with beside.open("xb") as out:
                 out.write(content)
+            if executable:
+                beside.chmod(0o755)
             beside.replace(path)
         finally:
             beside.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,10 +17,11 @@ import pytest
 
 from dalytools import cli
 from dalytools.bundle import NAME, bundle
+from dalytools.extcap_wrapper import answers, wrapper, wrapper_name
 from dalytools.field_names import FIELD_NAMES
 from dalytools.installation import PROFILE, RECORD, Done, Installation, Step
 from dalytools.tshark import dissector_folder, find_tshark
-from dalytools.wireshark_folders import WiresharkFolders, wireshark_folders
+from dalytools.wireshark_folders import WiresharkFolders, extcap_folder, wireshark_folders
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +41,7 @@ def home(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def folders(home: Path) -> WiresharkFolders:
-    return WiresharkFolders("tshark", "4.0.17", True, home / "plugins", home / "profiles")
+    return WiresharkFolders("tshark", "4.0.17", True, home / "plugins", home / "profiles", home / "extcap")
 
 
 def steps(done: list[Done]) -> list[Step]:
@@ -49,7 +51,7 @@ def steps(done: list[Done]) -> list[Step]:
 def as_user(home: Path, *arguments: str) -> str:
     """What tshark prints for an ordinary user with this home."""
     for path in (home, *home.rglob("*")):
-        path.chmod(0o755 if path.is_dir() else 0o644)
+        path.chmod(0o755 if path.is_dir() or os.access(path, os.X_OK) else 0o644)
     words = [find_tshark(), "-n", *arguments]
     if os.geteuid() == 0:
         words = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", *words]
@@ -59,8 +61,61 @@ def as_user(home: Path, *arguments: str) -> str:
     return done.stdout.decode()
 
 
+@pytest.mark.parametrize(
+    ("version", "folder"),
+    [
+        ("4.0.17", ".config/wireshark/extcap"),
+        ("4.2.0", ".local/lib/wireshark/extcap"),
+        ("4.4.18", ".local/lib/wireshark/extcap"),
+        ("4.6.9", ".local/lib/wireshark/extcap"),
+    ],
+)
+def test_where_each_version_looks_for_capture_tools(version: str, folder: str, tmp_path: Path) -> None:
+    """The release notes of 4.1.0: beside the plugins from then on."""
+    configuration, plugins = tmp_path / ".config/wireshark", tmp_path / ".local/lib/wireshark/plugins"
+    assert extcap_folder(version, configuration, plugins) == tmp_path / folder
+
+
+def test_the_capture_tool_works_and_is_mended(home: Path) -> None:
+    """As Wireshark starts it; a tool that may not be run, or is older than this, is made anew."""
+    installation = Installation(wireshark_folders())
+    installation.install()
+    tool = installation.tool
+    assert answers(tool)[0]
+    tool.chmod(0o644)
+    assert not answers(tool)[0]
+    assert next(each.step for each in installation.state() if each.path == tool) is Step.REPLACE
+    installation.install()
+    assert answers(tool)[0]
+    tool.write_bytes(b"#!/bin/sh\nexit 3\n")
+    assert answers(tool) == (False, f"{tool} does not answer (it says nothing); to mend it: dalyshark install")
+
+
+def test_the_capture_tool_of_a_path_with_spaces(tmp_path: Path) -> None:
+    python = tmp_path / "a folder's" / "python"
+    python.parent.mkdir()
+    python.symlink_to(sys.executable)
+    tool = tmp_path / "dalyshark"
+    tool.write_bytes(wrapper(str(python), "posix"))
+    tool.chmod(0o755)
+    done = subprocess.run(["sh", "-n", tool], capture_output=True, check=True)
+    assert done.stderr == b""
+    assert subprocess.run([tool, "--version"], capture_output=True, check=False).returncode != 127
+
+
+def test_the_capture_tool_of_windows() -> None:
+    r"""Laid out by hand; cmd passes the words on with %*."""
+    assert wrapper_name("nt") == "dalyshark.bat"
+    assert wrapper(r"C:\Program Files\Python\python.exe", "nt") == (
+        b"@echo off\r\n"
+        b"rem dalyshark's capture tool for Wireshark\r\n"
+        b'"C:\\Program Files\\Python\\python.exe" -c "from dalycapture.extcap import entry; entry()" %*\r\n'
+    )
+
+
 def test_the_real_tsharks_folders(home: Path) -> None:
     found = wireshark_folders()
+    assert found.extcap in {home / ".config/wireshark/extcap", home / ".local/lib/wireshark/extcap"}
     assert found.plugins == home / ".local/lib/wireshark/plugins"
     assert found.profiles == home / ".config/wireshark/profiles"
     assert found.lua

@@ -9,11 +9,14 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dalycapture.port import serial_ports
 from dalytools import __version__
+from dalytools.extcap_wrapper import answers
 from dalytools.installation import Installation, Step
 from dalytools.problem import Problem
 from dalytools.terminal_text import plain
@@ -68,10 +71,11 @@ def _wireshark(folders: WiresharkFolders) -> list[Finding]:
     except Problem as problem:
         found.append(Finding(ok=False, what="dissector", said=str(problem)))
     installation = Installation(folders, dry_run=True)
-    plugin, *profile = installation.state()
+    plugin, tool, *profile = installation.state()
     found.append(Finding(plugin.step is Step.SAME, "plugin", _state([plugin.step], str(folders.plugins))))
     steps = [each.step for each in profile]
     found.append(Finding(set(steps) == {Step.SAME}, "profile", _state(steps, str(folders.profiles))))
+    found += _capture_tool(folders, installation, tool.step)
     others = installation.others()
     if others:
         said = f"also there: {', '.join(map(str, others))}; remove it, only one is loaded"
@@ -79,6 +83,24 @@ def _wireshark(folders: WiresharkFolders) -> list[Finding]:
     if hasattr(os, "geteuid") and os.geteuid() == 0 and not folders.version.startswith("4.0."):
         said = "you are root: Wireshark 4.2 and later load no plugins for root, start it as an ordinary user"
         found.append(Finding(ok=False, what="user", said=said))
+    return found
+
+
+def _capture_tool(folders: WiresharkFolders, installation: Installation, step: Step) -> list[Finding]:
+    """Look at what captures inside Wireshark: our tool, and Wireshark's own dumpcap, which reads from it."""
+    said = _state([step], str(folders.extcap))
+    well = step is Step.SAME
+    if well:
+        well, more = answers(installation.tool)
+        said = f"{said}, {more}" if well else more
+    found = [Finding(well, "capture tool", said)]
+    dumpcap = shutil.which("dumpcap") or shutil.which("dumpcap", path=str(Path(folders.program).parent))
+    if dumpcap is None:
+        there = shutil.which("dumpcap", mode=os.F_OK)
+        said = "you may not run dumpcap, and Wireshark captures nothing without it: sudo usermod -aG wireshark $USER, "
+        said += "then log in again"
+        missing = "dumpcap, which Wireshark captures with, is not installed; on Debian and Ubuntu it is in tshark"
+        found.append(Finding(ok=False, what="dumpcap", said=said if there else missing))
     return found
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""``dalyshark install``: the dissector and the profile into this user's Wireshark folders.
+"""``dalyshark install``: dissector, profile and capture tool into this user's Wireshark folders.
 
 Exit status: 0 all is in place, 1 a file was kept that you changed, 2 could not be done.
 """
@@ -11,6 +11,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+from dalytools.extcap_wrapper import answers
 from dalytools.installation import PROFILE, Done, Installation, Step
 from dalytools.problem import Problem
 from dalytools.terminal_text import plain
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.description = (
-        "Put the dissector (one file) and the profile into the personal folders of the Wireshark that is found, and "
-        "see that it loads. A file that you changed is overwritten only after you said yes."
+        "Put the dissector (one file), the profile and the capture tool into the personal folders of the Wireshark "
+        "that is found, and see that all works. A file that you changed is overwritten only after you said yes."
     )
     parser.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
     parser.add_argument("--force", action="store_true", help="overwrite without asking")
@@ -46,9 +47,12 @@ def run(args: argparse.Namespace) -> int:
     if any(each.step in (Step.KEEP, Step.LEAVE) for each in done):
         return 1
     prove(folders)
+    well, said = answers(installation.tool)
+    if not well:
+        raise Problem(f"installed, but {said}")
     print(  # noqa: T201
         f"tshark {folders.version} loads it. In Wireshark choose the profile {PROFILE!r} "
-        "(4.4 and later choose it by themselves)."
+        "(4.4 and later choose it by themselves). Its list of interfaces has 'Daly BMS', to capture from."
     )
     return 0
 

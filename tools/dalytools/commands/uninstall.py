@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.description = (
-        "Remove the dissector and the profile from Wireshark's personal folders. What you changed is asked for."
+        "Remove the dissector, the profile and the capture tool from Wireshark's personal folders. What you changed is "
+        "asked for."
     )
     parser.add_argument("--dry-run", action="store_true", help="say what would be done, and do nothing")
     parser.add_argument("--force", action="store_true", help="remove without asking")
