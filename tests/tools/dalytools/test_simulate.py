@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import subprocess
@@ -93,3 +94,65 @@ def test_scenario_from_words() -> None:
     assert board_numbers("2") == [2]
     with pytest.raises(Problem):
         scenario(parsed("--baud", "1"))
+
+
+def simulated(*words: object) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(command(*map(str, words)), capture_output=True, timeout=60, check=False)
+
+
+def test_list_and_example(tmp_path: Path) -> None:
+    listed = simulated("--list").stdout.decode().splitlines()
+    assert len(listed) >= 20
+    assert any(line.startswith("shared-bus ") and line.endswith("[g.9]") for line in listed)
+    example = simulated("--example").stdout
+    (tmp_path / "mine.toml").write_bytes(example)
+    done = simulated(tmp_path / "mine.toml", "-w", tmp_path / "x.pcapng", "--duration", "1")
+    assert (done.returncode, done.stdout) == (0, b"")
+    assert b"on the wire in 1 s, as uart" in done.stderr
+
+
+def test_a_capture_goes_down_a_pipe_and_needs_no_file() -> None:
+    one = simulated("-w", "-", "--duration", "2", "--boards", "1-2")
+    two = simulated("-w", "-", "--duration", "2", "--boards", "1-2")
+    assert one.returncode == 0
+    assert one.stdout == two.stdout
+    assert one.stdout[:4] == b"\x0a\x0d\x0d\x0a"
+    assert simulated("-w", "-", "--duration", "2", "--boards", "1-2", "--seed", "2").stdout != one.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("no-such-scenario",), "--list shows them"),
+        (("faults", "--cells", "4"), "--cells and a scenario do not go together"),
+        (("faults", "--no-host"), "--no-host and a scenario"),
+        (("faults", "--baud", "1", "-w", "x"), "300 to 4000000"),
+        (("clean-can",), "goes to a capture: -w FILE"),
+        (("clean-16s", "-w", "/no/where/x.pcapng"), "there is no directory"),
+        (("clean-16s", "-w", "-", "--replay", "x"), "choose one of them"),
+        (("clean-ble", "-w", "x.pcapng", "--wire", "can"), "speaks d2, which CAN does not carry"),
+    ],
+)
+def test_wrong_scenarios_get_one_line(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    done = subprocess.run(command(*words), cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_live_scenario_answers_modbus_clients_and_writes_its_truth(tmp_path: Path) -> None:
+    (tmp_path / "my.toml").write_text("host = []\n[[board]]\ndialects = ['a5', 'd2']\n", encoding="utf-8")
+    words = command(str(tmp_path / "my.toml"), "--truth", str(tmp_path / "t.json"), "--duration", "20")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        _, client = labelled(process)
+        fd = os.open(client, os.O_RDWR | os.O_NOCTTY)
+        os.write(fd, bytes.fromhex("D206000C00019BAA"))  # the article's
+        heard = b""
+        while len(heard) < 8:
+            heard += os.read(fd, 8)
+        os.close(fd)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+    assert heard == bytes.fromhex("D206000C00019BAA")
+    (note,) = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))["notes"]
+    assert (note["what"], note["host"], note["register"], note["result"]) == ("write", "client", 0x0C, "confirmed")

@@ -1,22 +1,43 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""``dalyshark simulate``: a bus with boards and a host on pseudo-terminals, until stopped."""
+"""``dalyshark simulate``: boards and hosts on pseudo-terminals until stopped, or straight into a capture."""
 
 from __future__ import annotations
 
 import argparse
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dalytools.problem import Problem
 from dalytools.simulator.live import SimulatedBus
 from dalytools.simulator.scenario import Board, Damage, Habits, Host, Pack, Scenario
+from dalytools.simulator.scenario_file import WIRES as WIRE_NAMES
+from dalytools.simulator.scenario_file import example_text, read_scenario, ready_made
+from dalytools.simulator.truth import Truth
+from dalytools.terminal_text import counted
+from dalytools.whole_file import whole_file
 
 if TYPE_CHECKING:
     from types import FrameType
 
 _LINGER_S = 0.3  # a reader of the tap gets the last bytes before the port is hung up
+_IN_THE_FILE = (
+    "boards",
+    "cells",
+    "sensors",
+    "soc",
+    "pack_speed",
+    "asleep",
+    "fault",
+    "frame_base",
+    "reserved",
+    "sensor_frames",
+    "host",
+    "host_address",
+    "damage",
+)
 
 
 def board_numbers(text: str) -> list[int]:
@@ -55,9 +76,22 @@ def _positive(text: str) -> float:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Describe the command line of ``dalyshark simulate``."""
     parser.description = (
-        "A Daly bus without hardware: prints the path of a tap (listen there) and of a client port (ask the boards "
-        "there), then runs until stopped."
+        "A Daly bus without hardware. Prints the path of a tap (listen there) and of a client port (ask the boards "
+        "there), then runs until stopped; or, with -w, writes a capture of it as fast as it can. What happens on the "
+        "bus stands in a SCENARIO file, or is made up from the options below."
     )
+    parser.add_argument(
+        "scenario", nargs="?", metavar="SCENARIO", help="a scenario file (TOML), or the name of a ready-made one"
+    )
+    parser.add_argument("--list", action="store_true", help="list the ready-made scenarios, and end")
+    parser.add_argument(
+        "--example", action="store_true", help="print a scenario file with every key explained, and end"
+    )
+    add = parser.add_argument_group("capture").add_argument
+    add("-w", dest="output", metavar="FILE", help="write a capture instead; - is standard output")
+    add("--wire", choices=WIRE_NAMES, help="what carries the traffic (the scenario's own, or uart)")
+    add("-F", dest="file_format", choices=["pcapng", "pcap"], default="pcapng", help="file format (pcapng)")
+    add("--truth", type=Path, metavar="FILE", help="write what was put into the traffic, and when, as JSON")
     add = parser.add_argument_group("boards").add_argument
     add("--boards", type=board_numbers, default=[1], metavar="LIST", help="board numbers, such as 1,2 or 1-3 (1)")
     add("--cells", type=int, default=16, metavar="N", help="cells in series, 1 to 48 (16)")
@@ -97,12 +131,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="silences in the capture are cut to this (2)",
     )
-    add("--duration", type=_positive, metavar="S", help="stop after so many seconds")
+    add("--duration", type=_positive, metavar="S", help="stop after so many seconds (a capture: the scenario's own)")
     add("--link", type=Path, metavar="DIR", help="stable names: links DIR/tap and DIR/client")
 
 
+def chosen(args: argparse.Namespace) -> Scenario:
+    """Read the scenario file, or make one up from the options; not both, but for seed and baud. Raises Problem."""
+    if not args.scenario:
+        return scenario(args)
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    plain = parser.parse_args([])
+    for option in _IN_THE_FILE:
+        if getattr(args, option) != getattr(plain, option):
+            word = "--no-host" if option == "host" else "--" + option.replace("_", "-")
+            raise Problem(f"{word} and a scenario do not go together: say it in the file; --example shows how")
+    found = read_scenario(args.scenario)
+    seed = args.seed if args.seed != plain.seed else found.seed
+    baud = args.baud if args.baud != plain.baud else found.baud
+    try:
+        return replace(found, seed=seed, baud=baud)
+    except ValueError as error:
+        raise Problem(str(error)) from error
+
+
 def scenario(args: argparse.Namespace) -> Scenario:
-    """Make the scenario that the command line asks for. Raises Problem."""
+    """Make the scenario that the options ask for. Raises Problem."""
     try:
         pack = Pack(cells=args.cells, sensors=args.sensors, start_soc=args.soc, speed=args.pack_speed)
         habits = Habits(frame_base=args.frame_base, reserved=args.reserved, sensor_frames=args.sensor_frames)
@@ -120,9 +174,53 @@ def scenario(args: argparse.Namespace) -> Scenario:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the bus until SIGINT, SIGTERM, the end of --duration or of the replay. Raises Problem."""
+    """List, print, write a capture, or run the bus. Raises Problem."""
+    if args.list:
+        return _list()
+    if args.example:
+        sys.stdout.write(example_text())
+        return 0
+    made = chosen(args)
+    if args.output:
+        if args.replay:
+            raise Problem("--replay plays a capture on the tap, and -w writes one: choose one of them")
+        return _write(args, made)
+    if (args.wire or made.wire) != "uart":
+        raise Problem(f"a live bus is serial; a scenario on {args.wire or made.wire} goes to a capture: -w FILE")
+    return _run_live(args, made)
+
+
+def _list() -> int:
+    found = ready_made()
+    width = max(map(len, found))
+    for name, one in found.items():
+        story = f" [{one.story}]" if one.story else ""
+        print(f"{name:<{width}}  {one.wire:<4}  {one.about}{story}")  # noqa: T201
+    return 0
+
+
+def _write(args: argparse.Namespace, made: Scenario) -> int:
+    from dalytools.simulator.capture_file import write_capture
+
+    wire = args.wire or made.wire
+    seconds = args.duration or 0.0
+    written = write_capture(
+        made, args.output, wire=wire, seconds=seconds, file_format=args.file_format, truth=args.truth
+    )
+    where = "standard output" if args.output == "-" else args.output
+    print(  # noqa: T201
+        f"{where}: {counted(written.packets, 'packet')}, {counted(written.wire_bytes, 'byte')} on the wire in "
+        f"{seconds or made.duration_s:g} s, as {wire}",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def _run_live(args: argparse.Namespace, made: Scenario) -> int:
+    """Run the bus until SIGINT, SIGTERM, the end of --duration or of the replay."""
     bus = SimulatedBus(
-        scenario(args),
+        made,
+        truth=Truth(on=args.truth is not None),
         replay=args.replay,
         then_simulate=args.then_simulate,
         speed=args.speed,
@@ -143,6 +241,9 @@ def run(args: argparse.Namespace) -> int:
         for number, handler in before.items():
             signal.signal(number, handler)
         bus.close()
+    if args.truth is not None:
+        with whole_file(str(args.truth)) as out:
+            bus.bus.truth.write(out, made, wire="uart", end_ns=bus.ended_ns)
     if bus.problem:
         raise Problem(bus.problem)
     return 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A battery that moves: LFP cells in series, a load that comes and goes, and what a BMS measures of it.
+"""A battery that moves: cells in series, a load that comes and goes, and what a BMS measures of it.
 
     current --> charge of each cell --> open-circuit voltage --+--> cell voltage --> extremes, sum, faults, balancing
         |                                                      |
@@ -10,70 +10,21 @@ Only + - * / on floats and one seeded source of chance: the same seed gives the 
 
 from __future__ import annotations
 
-import itertools
 import random
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dalytools.simulator.chemistry import CHEMISTRIES
 from dalytools.simulator.faults import fault_payload
 
 if TYPE_CHECKING:
     from dalytools.simulator.scenario import Pack
 
-# Open-circuit voltage of an LFP cell over its charge: steep ends, a flat middle.
-#   charge, %   volts
-_OCV = (
-    (0.0, 2.500),
-    (2.0, 2.850),
-    (5.0, 3.030),
-    (10.0, 3.150),
-    (20.0, 3.225),
-    (30.0, 3.262),
-    (40.0, 3.284),
-    (50.0, 3.293),
-    (60.0, 3.304),
-    (70.0, 3.326),
-    (80.0, 3.334),
-    (90.0, 3.346),
-    (95.0, 3.368),
-    (98.0, 3.425),
-    (100.0, 3.560),
-)
-
 _OHM_HOURS = 0.060  # resistance of a cell x its capacity: 0.6 milliohm at 100 Ah
-_BALANCE_START_MV = 3400
 _BALANCE_DIFFERENCE_MV = 5
 _BALANCE_A = 0.1
 _THERMAL_S = 1800.0  # time constant of warming up and cooling down
 _HEATING_C = 9.0  # above ambient, in the long run, at a current of capacity / 1 h
-
-# Fault           quantity       level 1, level 2, back by     stops
-_LIMITS = (
-    ("cell_volt_high", "max_mv", 3600, 3650, 50, "charge"),
-    ("cell_volt_low", "min_mv", 2900, 2700, 100, "discharge"),
-    ("sum_volt_high", "mean_mv", 3580, 3630, 30, "charge"),
-    ("sum_volt_low", "mean_mv", 2950, 2800, 50, "discharge"),
-    ("chg_temp_high", "max_c", 50, 55, 3, "charge"),
-    ("chg_temp_low", "min_c", 2, 0, 3, "charge"),
-    ("dischg_temp_high", "max_c", 60, 65, 3, "discharge"),
-    ("dischg_temp_low", "min_c", -15, -20, 3, "discharge"),
-    ("chg_overcurrent", "charge_c", 1.0, 1.2, 0.1, ""),
-    ("dischg_overcurrent", "discharge_c", 1.5, 2.0, 0.1, ""),
-    ("soc_low", "soc", 10, 5, 2, ""),
-    ("diff_volt", "difference_mv", 300, 500, 30, ""),
-    ("diff_temp", "difference_c", 15, 20, 2, ""),
-)
-
-
-def _ocv_table() -> list[float]:
-    table: list[float] = []
-    for (low, volts), (high, more) in itertools.pairwise(_OCV):
-        steps = round((high - low) * 10)
-        table += [volts + (more - volts) * step / steps for step in range(steps)]
-    return [*table, _OCV[-1][1], _OCV[-1][1]]
-
-
-_OCV_BY_PERMILLE = _ocv_table()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +45,8 @@ class Reading:
     charger: bool
     load: bool
     cycles: int
+    charged_ah: int  # in its life
+    discharged_ah: int
 
     @property
     def pack_dv(self) -> int:
@@ -106,6 +59,8 @@ class Battery:
 
     def __init__(self, pack: Pack, seed: str) -> None:
         self.pack = pack
+        self.chemistry = CHEMISTRIES[pack.chemistry]
+        self._limits = self.chemistry.limits
         self.charge_mos = True  # as commanded; protection may hold it open all the same
         self.discharge_mos = True
         self.forced: set[str] = set()
@@ -118,7 +73,8 @@ class Battery:
         self._charge = [min(1.0, max(0.0, pack.start_soc / 100 + self._off(pack.spread))) for _ in range(pack.cells)]
         self._sensor_off = [self._off(1.5) for _ in range(pack.sensors)]
         self._remaining_ah = pack.start_soc / 100 * self._capacity_ah
-        self._throughput_ah = 0.0
+        self._throughput_ah = 0.0  # out of it
+        self._charged_ah = 0.0
         self._warm_c = 0.0
         self._phase = 0
         self._phase_left = pack.profile[0].seconds if pack.profile else 0.0
@@ -135,6 +91,11 @@ class Battery:
     def reading(self) -> Reading:
         """The newest measurement."""
         return self._reading
+
+    def set_soc(self, permille: int) -> None:
+        """Take the board's word for it: what a write of the state of charge does. The cells stay as they are."""
+        self._remaining_ah = min(1000, permille) / 1000 * self._capacity_ah
+        self.refresh()
 
     def refresh(self) -> None:
         """Measure again after a switch or a fault on demand, without time passing."""
@@ -153,6 +114,8 @@ class Battery:
         self._remaining_ah = min(self._capacity_ah, max(0.0, self._remaining_ah + current * hours))
         if current < 0:
             self._throughput_ah -= current * hours
+        else:
+            self._charged_ah += current * hours
         balance = self._balance
         charge = self._charge
         for cell, amperes_hours in enumerate(self._cell_ah):
@@ -167,8 +130,8 @@ class Battery:
         profile = self.pack.profile
         if not profile:
             return 0.0
-        empty = self._remaining_ah <= 0 or min(before.cells_mv) < 2850
-        full = max(before.cells_mv) > 3590
+        empty = self._remaining_ah <= 0 or min(before.cells_mv) < self.chemistry.empty_mv
+        full = max(before.cells_mv) > self.chemistry.full_mv
         for _ in profile:
             amperes = profile[self._phase].current_a
             if self._phase_left > 0 and not (amperes < 0 and empty) and not (amperes > 0 and full):
@@ -179,7 +142,7 @@ class Battery:
 
     def _measure(self) -> Reading:
         current = self._current
-        table = _OCV_BY_PERMILLE
+        table = self.chemistry.by_permille
         cells: list[int] = []
         for charge, ohm in zip(self._charge, self._ohm, strict=True):
             permille = charge * 1000
@@ -194,8 +157,8 @@ class Battery:
         faults = self._alarms | self.forced
         if not (self.charge_mos and self.discharge_mos):
             faults.add("mos_off_by_command")
-        self._balance = _to_balance(cells, current)
-        stops = {stops for name, *_, stops in _LIMITS if f"{name}_level_2" in faults}
+        self._balance = _to_balance(cells, current, self.chemistry.balance_start_mv)
+        stops = {stops for name, *_, stops in self._limits if f"{name}_level_2" in faults}
         short = "short_circuit_protect" in faults
         return Reading(
             cells_mv=tuple(cells),
@@ -212,6 +175,8 @@ class Battery:
             charger=current > 0,
             load=current < 0,
             cycles=self.pack.cycles + int(self._throughput_ah / self._capacity_ah),
+            charged_ah=int(self.pack.cycles * self._capacity_ah + self._charged_ah),
+            discharged_ah=int(self.pack.cycles * self._capacity_ah + self._throughput_ah),
         )
 
     def _watch(self, cells: list[int], sensors: tuple[int, ...], current: float) -> None:
@@ -229,7 +194,7 @@ class Battery:
             "discharge_c": -c_rate,
             "soc": self._remaining_ah / self._capacity_ah * 100,
         }
-        for fault, quantity, level_1, level_2, back, _ in _LIMITS:
+        for fault, quantity, level_1, level_2, back, _ in self._limits:
             value = values[quantity]
             below = fault.endswith("_low")
             for name, limit in ((f"{fault}_level_1", level_1), (f"{fault}_level_2", level_2)):
@@ -248,13 +213,13 @@ def _rounded(value: float) -> int:
     return int(value + 0.5) if value >= 0 else -int(0.5 - value)
 
 
-def _to_balance(cells: list[int], current: float) -> int:
+def _to_balance(cells: list[int], current: float, start_mv: int) -> int:
     """Cells to bleed: at rest or charging, those well above the lowest once the highest is nearly full."""
-    if current < 0 or max(cells) < _BALANCE_START_MV:
+    if current < 0 or max(cells) < start_mv:
         return 0
     floor = min(cells) + _BALANCE_DIFFERENCE_MV
     mask = 0
     for cell, millivolts in enumerate(cells):
-        if millivolts > floor and millivolts >= _BALANCE_START_MV:
+        if millivolts > floor and millivolts >= start_mv:
             mask |= 1 << cell
     return mask

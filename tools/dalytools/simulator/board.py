@@ -13,7 +13,9 @@
     96   frame 40 + C of seven sensors
     97   mask, cell 1 = d0 bit 0             .     .
     98   fault bits                                code
-    D8   wake-up source
+    99   on    current     place .     .     .     .         balance; 9A SOH, D8 wake-up source
+    50 .. 6A   settings and texts: settings.py;  70 .. 8A   alarm grid, where the firmware has one
+    10 .. 2A   writes = read - 40, answered with the same bytes (field notes a.3);  00   restart, not answered
     D9   discharge MOS on, off;  DA charge MOS on, off: 01 on, 00 off, answered with the new state (fact 7)
 
 A dot is a byte the paper calls reserved. What old boards leave there (fact 2) is the default here:
@@ -24,11 +26,16 @@ last 94 or 95.
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
+
+from dalytools.simulator import modbus
+from dalytools.simulator.registers import ABSENT, CLOCKS, MOS_SWITCHES, SETTINGS, SOC_WRITES, Measured, d2, p81
+from dalytools.simulator.settings import TEXT_FRAMES, WRITE_OFFSET, Settings
 
 if TYPE_CHECKING:
     from dalytools.simulator.battery import Battery, Reading
-    from dalytools.simulator.scenario import Asleep, Board
+    from dalytools.simulator.scenario import Asleep, Board, Dialect
 
 START, LENGTH = 0xA5, 8
 FRAME_BYTES = 13
@@ -36,7 +43,25 @@ CELLS_A_FRAME, SENSORS_A_FRAME = 3, 7
 CELL_FRAMES = 16  # of 0x95, to a host with address 0x80, whatever the number of cells (fact 6)
 HOST_PC, HOST_APP, HOST_GPRS = 0x40, 0x80, 0x20
 
+WRITE_IDS = range(0x10, 0x2B)
+SET_CLOCK_AND_SOC = 0x21
+RESTART = 0x00
+RESTART_S = 3.0  # field notes a.3
+
 _NOTHING = bytes(8)
+_EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+
+# Which reply carries which contradiction (docs/records.md, 11)
+LIE_IDS = {
+    "pack_voltage": 0x90,
+    "soc": 0x90,
+    "cell_max": 0x91,
+    "cell_min": 0x91,
+    "cell_number": 0x91,
+    "temperature_max": 0x92,
+    "temperature_min": 0x92,
+    "sensor_number": 0x92,
+}
 
 
 class Answer(NamedTuple):
@@ -53,7 +78,7 @@ def frame(address: int, data_id: int, payload: bytes) -> bytes:
 
 
 def is_request(data: bytes) -> bool:
-    """Whether these bytes are a whole, undamaged frame from a host (address 0x20 and up, field notes, fact 3)."""
+    """Whether these bytes are a whole, undamaged A5 frame from a host (address 0x20 and up, field notes, fact 3)."""
     return (
         len(data) == FRAME_BYTES
         and data[0] == START
@@ -61,6 +86,27 @@ def is_request(data: bytes) -> bool:
         and data[1] >= 0x20
         and sum(data[:12]) & 0xFF == data[12]
     )
+
+
+def request_length(data: bytes) -> int:
+    """Length of the good request, of any dialect, that begins these bytes; 0 where there is none."""
+    return FRAME_BYTES if is_request(data[:FRAME_BYTES]) else modbus.request_length(data)
+
+
+def may_become_request(data: bytes) -> bool:
+    """Whether these bytes begin like a request that is not whole yet."""
+    if not data:
+        return False
+    if data[0] == START:
+        return len(data) < FRAME_BYTES
+    return modbus.may_become_request(data)
+
+
+def writes(request: bytes) -> bool:
+    """Whether a good request changes something."""
+    if request[0] == START:
+        return request[2] in WRITE_IDS or request[2] in {RESTART, 0xD9, 0xDA}
+    return request[1] != modbus.READ
 
 
 class SimulatedBoard:
@@ -75,6 +121,11 @@ class SimulatedBoard:
         self._addresses = {0x3F + board.number}
         if board.number == 1:
             self._addresses |= {HOST_APP, HOST_GPRS}
+        self.settings = Settings(board, battery)
+        self.now_s = 0.0  # of bus time, set by the bus
+        self.lies: set[str] = set()  # names of Lie, for the next answer
+        self.silent_until_s = 0.0  # while it restarts
+        self.start = _EPOCH  # its clock at bus time 0
         self._zero_left = 0
         self._life = 0
         self._soc = b"\0\0"  # of the last 0x90 as sent
@@ -88,14 +139,34 @@ class SimulatedBoard:
             self.asleep = ""
             self._zero_left = self.board.habits.zero_replies
 
+    @property
+    def zero_replies_left(self) -> int:
+        """How many of the next replies will be all zero."""
+        return self._zero_left
+
+    def listens_to(self, request: bytes) -> bool:
+        """Whether a good request is for this board, whatever it then says."""
+        dialects = self.board.dialects
+        if request[0] == START:
+            return "a5" in dialects and request[1] in self._addresses
+        if request[0] == modbus.D2:
+            return "d2" in dialects
+        return "81" in dialects and request[0] == modbus.ASKS_81 + self.board.number
+
     def answer(self, request: bytes) -> Answer | None:
-        """Answer a good request (13 bytes), or None: not for this board, an unknown ID, or fast asleep."""
-        if request[1] not in self._addresses:
+        """Answer a good request, or None: not for this board, an unknown ID, or fast asleep."""
+        if self.now_s < self.silent_until_s:
             return None
+        if not self.listens_to(request):
+            return None
+        if request[0] != START:
+            return self._answer_modbus(request)
         habits = self.board.habits
         if self.asleep:
             return Answer(habits.echo_ms, [request]) if self.asleep == "echo" else None
         data_id = request[2]
+        if data_id in habits.unanswered or (habits.writes == "silent" and writes(request)):
+            return None
         payloads = self._payloads(data_id, request)
         if not payloads:
             return None
@@ -129,10 +200,145 @@ class SimulatedBoard:
                 return [reading.fault_bytes]
             case 0xD8:
                 return [_NOTHING]
+            case 0x99:
+                active = (reading.balance_mask & -reading.balance_mask).bit_length()
+                return [bytes((active > 0,)) + (30000).to_bytes(2) + bytes((active,)) + bytes(4)]
+            case 0x9A:
+                return [b"\0\x64" + bytes(6)]
             case 0xD9 | 0xDA:
                 return [self._switch(data_id, request[4])]
             case _:
-                return []
+                return self._setting(data_id, request[4:12])
+
+    def settable(self, data_id: int) -> bool:
+        """Whether a write with this ID changes something here."""
+        return data_id in {RESTART, 0xD9, 0xDA, SET_CLOCK_AND_SOC} or (
+            data_id in WRITE_IDS and self.settings.payload(data_id + WRITE_OFFSET) is not None
+        )
+
+    def _setting(self, data_id: int, payload: bytes) -> list[bytes]:
+        """Answer a read or a write of settings, texts and the clock; nothing for what it does not know."""
+        settings, habits = self.settings, self.board.habits
+        if data_id == SET_CLOCK_AND_SOC:
+            taken = habits.writes == "accept" and not self._zero_left
+            if taken:
+                self._set_clock(payload[:6])
+                self.battery.set_soc(int.from_bytes(payload[6:8]))
+            return [bytes((taken,)) + self._reserved(self._behind_switch)]
+        if data_id == RESTART:
+            if habits.writes == "accept":
+                self.silent_until_s = self.now_s + RESTART_S
+            return []
+        if data_id in WRITE_IDS and settings.payload(data_id + WRITE_OFFSET) is not None:
+            if habits.writes == "accept" and not self._zero_left:
+                settings.take(data_id + WRITE_OFFSET, payload)
+                return [payload]
+            return [settings.payload(data_id + WRITE_OFFSET) or _NOTHING]
+        if data_id in TEXT_FRAMES:
+            return settings.text_payloads(data_id, habits.frame_base)
+        if data_id == 0x52:
+            reading = self.battery.reading
+            return [reading.charged_ah.to_bytes(4) + reading.discharged_ah.to_bytes(4)]
+        if data_id == 0x54:
+            return [settings.texts.firmware_index.encode("ascii", "replace")[:8].ljust(8, b"\0")]
+        if data_id == 0x61:
+            return [self._clock() + b"\0\0"]
+        if 0x70 <= data_id <= 0x8A and habits.alarm_grid:
+            return [self._alarm(data_id)]
+        known = settings.payload(data_id)
+        return [] if known is None else [known]
+
+    def _clock(self) -> bytes:
+        now = self.start + timedelta(seconds=int(self.now_s))
+        return bytes((now.year % 100, now.month, now.day, now.hour, now.minute, now.second))
+
+    def _set_clock(self, said: bytes) -> None:
+        """Take year, month .. second; zeros mean that only the SOC is written (field notes a.3)."""
+        if not any(said):
+            return
+        try:
+            now = datetime(2000 + said[0], *said[1:6], tzinfo=UTC)
+            self.start = now - timedelta(seconds=int(self.now_s))
+        except (ValueError, OverflowError):
+            return  # no such day
+
+    def _alarm(self, data_id: int) -> bytes:
+        """One cell of the alarm grid: ID = 70 + 9 x (level - 1) + class; the third level is the second's."""
+        level, kind = divmod(data_id - 0x70, 9)
+        values = self.settings.values
+        level = min(2, level + 1)
+        delay = 500  # 0.01 s
+        if kind == 2:
+            discharge = 30000 + values[f"discharge_current_{level}"]
+            charge = 30000 + values[f"charge_current_{level}"]
+            return b"".join(word.to_bytes(2) for word in (discharge, delay, charge, delay))
+        if kind in {3, 4}:
+            side = "high" if kind == 3 else "low"
+            limit = values[f"charge_temp_{side}_{level}"] + 40
+            back = limit - 3 if kind == 3 else limit + 3
+            return bytes((limit, 5, back, 5, limit, 5, back, 5))
+        name = {
+            0: "cell_high",
+            1: "cell_low",
+            5: "pack_high",
+            6: "pack_low",
+            7: "cell_difference",
+            8: "temp_difference",
+        }
+        limit = values[f"{name[kind]}_{level}"]
+        back = limit + limit // 50 if kind in {1, 6} else limit - limit // 50
+        return b"".join(word.to_bytes(2) for word in (limit, delay, back, delay))
+
+    def registers(self, dialect: Dialect) -> dict[int, int]:
+        """All registers that it has in this Modbus dialect, as they stand now; all zero just after waking up."""
+        habits = self.board.habits
+        soc_off = -50 if "soc" in self.lies else 0
+        now = Measured(
+            self.battery.reading, self.settings, self._clock(), habits.reserved, habits.discharge_high, soc_off
+        )
+        words = d2(now) if dialect == "d2" else p81(now)
+        return dict.fromkeys(words, 0) if self._zero_left else words
+
+    def _answer_modbus(self, data: bytes) -> Answer | None:
+        request = modbus.parse(data)
+        if request is None or self.asleep:  # Modbus knows no echo
+            return None
+        dialect: Dialect = "d2" if request.address == modbus.D2 else "81"
+        habits = self.board.habits
+        if request.writes and habits.writes == "silent":
+            return None
+        if not request.writes:
+            words = self.registers(dialect)
+            values = [words.get(request.register + place, ABSENT) for place in range(request.count)]
+        else:
+            if habits.writes == "accept" and not self._zero_left:
+                for place, value in enumerate(request.values):
+                    self._write_register(dialect, request.register + place, value)
+                self._write_clock(dialect, request)
+                values = list(request.values)
+            else:
+                old = self.registers(dialect).get(request.register, ABSENT)
+                values = [old, *request.values[1:]]
+            self.battery.refresh()
+        self._zero_left = max(0, self._zero_left - 1)
+        return Answer(habits.reply_ms, [modbus.reply(request, values)])
+
+    def _write_register(self, dialect: Dialect, register: int, value: int) -> None:
+        charge, discharge = MOS_SWITCHES[dialect]
+        if register == charge:
+            self.battery.charge_mos = bool(value)
+        elif register == discharge:
+            self.battery.discharge_mos = bool(value)
+        elif register == SOC_WRITES[dialect]:
+            self.battery.set_soc(value)
+        elif dialect == "d2" and register in {0xF0, 0xF3}:
+            self.silent_until_s = self.now_s + RESTART_S
+        elif setting := SETTINGS[dialect].get(register):
+            self.settings.values[setting.name] = (value - setting.offset) * setting.scale
+
+    def _write_clock(self, dialect: Dialect, request: modbus.Request) -> None:
+        if request.register == CLOCKS[dialect] and request.count >= 3:
+            self._set_clock(b"".join(value.to_bytes(2) for value in request.values[:3]))
 
     def _reserved(self, stale: bytes) -> bytes:
         match self.board.habits.reserved:
@@ -146,18 +352,27 @@ class SimulatedBoard:
     def _pack(self, reading: Reading) -> bytes:
         sign = -1 if self.board.habits.discharge_high else 1
         current = 30000 + sign * reading.current_da
-        self._soc = reading.soc_permille.to_bytes(2)
-        return reading.pack_dv.to_bytes(2) + b"\0\0" + min(65535, max(0, current)).to_bytes(2) + self._soc
+        soc, pack_dv = reading.soc_permille, reading.pack_dv
+        if self.lies:
+            soc = max(0, soc - 50) if "soc" in self.lies else soc
+            pack_dv = pack_dv * 21 // 20 if "pack_voltage" in self.lies else pack_dv
+        self._soc = soc.to_bytes(2)
+        return pack_dv.to_bytes(2) + b"\0\0" + min(65535, max(0, current)).to_bytes(2) + self._soc
 
     def _cell_extremes(self, reading: Reading) -> bytes:
         cells = reading.cells_mv
         high, low = max(cells), min(cells)
+        numbers = [cells.index(high) + 1, cells.index(low) + 1]
+        if self.lies:
+            high = high + 100 if "cell_max" in self.lies else high
+            low = low - 100 if "cell_min" in self.lies else low
+            numbers[0] = len(cells) + 1 if "cell_number" in self.lies else numbers[0]
         payload = b"".join(
             (
                 high.to_bytes(2),
-                bytes((cells.index(high) + 1,)),
+                bytes((numbers[0],)),
                 low.to_bytes(2),
-                bytes((cells.index(low) + 1,)),
+                bytes((numbers[1],)),
                 self._reserved(self._soc),
             )
         )
@@ -167,7 +382,11 @@ class SimulatedBoard:
     def _temperature_extremes(self, reading: Reading) -> bytes:
         sensors = reading.sensors_c
         high, low = max(sensors), min(sensors)
-        values = (_celsius(high), sensors.index(high) + 1, _celsius(low), sensors.index(low) + 1)
+        values = [_celsius(high), sensors.index(high) + 1, _celsius(low), sensors.index(low) + 1]
+        if self.lies:
+            values[0] = _celsius(high + 10) if "temperature_max" in self.lies else values[0]
+            values[2] = _celsius(low - 10) if "temperature_min" in self.lies else values[2]
+            values[1] = len(sensors) + 1 if "sensor_number" in self.lies else values[1]
         return bytes(values) + self._reserved(self._tail_91)
 
     def _mos(self, reading: Reading) -> bytes:
@@ -218,7 +437,7 @@ class SimulatedBoard:
         return payloads
 
     def _switch(self, data_id: int, value: int) -> bytes:
-        if value in {0, 1} and not self._zero_left:
+        if value in {0, 1} and not self._zero_left and self.board.habits.writes == "accept":
             if data_id == 0xD9:
                 self.battery.discharge_mos = bool(value)
             else:

@@ -5,27 +5,39 @@
     board                          37 ms  |--- A5 01 90 .. ---|   gap
     time    13.54 ms at 9600 baud          frames of a burst follow back to back
 
-One pair, half duplex: nothing overlaps. A host that gets no good reply asks again after its time-out.
+One pair, half duplex: what is heard never overlaps. A host that gets no good reply asks again after its time-out. Who
+begins to speak by himself is a station (stations.py): hosts, foreign devices, what a scenario sends, replies that come
+late. A station that does not listen may begin while another speaks: what is heard of both is mixed from there on.
 """
 
 from __future__ import annotations
 
 import random
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, NamedTuple
 
+from dalytools.simulator import modbus
 from dalytools.simulator.battery import Battery
-from dalytools.simulator.board import SimulatedBoard, frame, is_request
-from dalytools.simulator.scenario import HOST_BASE
+from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, is_request, request_length, writes
+from dalytools.simulator.harm import harmed, overlaid
+from dalytools.simulator.stations import NEVER, LateReply, Station, stations
+from dalytools.simulator.truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dalytools.simulator.scenario import Damage, Scenario
+    from dalytools.simulator.scenario import Event, Harm, Scenario
 
 TICK_NS = 500_000_000  # the batteries measure twice a second
 BITS_A_BYTE = 10  # 8N1
+TURN_NS = 5_000_000  # who listens lets the wire rest for so long after another has spoken
 
 HOST, CLIENT = "host", "client"
+NOISE = "noise"
+
+_TRICKS = frozenset(
+    ("silent", "late", "cut_burst", "skip_frame", "repeat_frame", "other_board", "contradict", "damage")
+)
 
 
 class Sent(NamedTuple):
@@ -36,145 +48,420 @@ class Sent(NamedTuple):
     data: bytes
 
 
-class Bus:
-    """Boards, host and wire of a scenario. ``now_ns`` is when the wire is next free, or the host next wants it."""
+class Exchange(NamedTuple):
+    """What a request led to: all that was heard, whether the host takes it as answered, and when the request ended."""
 
-    def __init__(self, scenario: Scenario, start_ns: int = 0) -> None:
+    sent: list[Sent]
+    answered: bool
+    request_end_ns: int
+
+
+class _Trick:
+    """An event that waits for the next answers of its board."""
+
+    def __init__(self, event: Event) -> None:
+        self.event = event
+        self.left = event.times
+
+    def used(self) -> Event:
+        self.left -= 1
+        return self.event
+
+
+class Bus:
+    """Boards, hosts and wire of a scenario. ``now_ns`` is when the wire is next free, or a host next wants it."""
+
+    def __init__(self, scenario: Scenario, start_ns: int = 0, truth: Truth | None = None) -> None:
         self.scenario = scenario
-        self.now_ns: int = start_ns
+        self.truth = truth or Truth()
         self.boards: dict[int, SimulatedBoard] = {}
         for board in scenario.boards:
             battery = Battery(board.pack, f"{scenario.seed}/battery/{board.number}")
-            self.boards[board.number] = SimulatedBoard(board, battery)
+            simulated = self.boards[board.number] = SimulatedBoard(board, battery)
+            simulated.start = datetime.fromtimestamp(scenario.start_ns // 10**9, UTC)
         self._start_ns = start_ns
+        self._free_ns = start_ns
         self._next_tick_ns = start_ns + TICK_NS
         self._char_ns: float = BITS_A_BYTE * 1_000_000_000 / scenario.baud
-        self._timing = random.Random(f"{scenario.seed}/timing")  # noqa: S311 - chance that can be repeated
-        self._harm = random.Random(f"{scenario.seed}/damage") if scenario.damage.total else None  # noqa: S311 - as above
-        self._events = sorted(scenario.events, key=lambda event: event.at_s, reverse=True)
-        host = scenario.host
-        addresses = [HOST_BASE + number for number in self.boards] if host.address is None else [host.address]
-        filler = bytes((host.filler,)) * 8
-        self._requests = [frame(address, data_id, filler) for address in addresses for data_id in host.plan]
-        self._plan_end = len(host.plan)
-        self._turn = 0
-        self._tries = 0
+        self.timing = random.Random(f"{scenario.seed}/timing")  # noqa: S311 - chance that can be repeated
+        self._harm = random.Random(f"{scenario.seed}/damage")  # noqa: S311 - as above
+        self._events = sorted(
+            (event for event in scenario.events if event.what != "send"), key=lambda event: event.at_s, reverse=True
+        )
+        self._last: Station | None = None  # who spoke last
+        self._stations = stations(scenario, list(self.boards), start_ns)
+        self._tricks: dict[int, list[_Trick]] = {}
+        self._faults: dict[int, frozenset[str]] = {number: frozenset() for number in self.boards}
+        self._seen_faults: dict[tuple[str, int], frozenset[str]] = {}
+        self.now_ns: int = self._next_wish()
+        self._note_faults(start_ns)
+
+    @property
+    def speaks(self) -> bool:
+        """Whether anybody will speak without being asked."""
+        return bool(self._stations)
 
     def wire_ns(self, data: bytes) -> int:
         """How long these bytes occupy the wire."""
         return int(len(data) * self._char_ns)
 
     def poll(self) -> list[Sent]:
-        """Send the host's next request, at ``now_ns``, with what follows it; moves ``now_ns`` on to the one after."""
-        host = self.scenario.host
-        request = self._requests[self._turn]
-        sent, answered, request_end = self._exchange(request, HOST)
-        if answered or self._tries >= host.retries:
-            self._turn = (self._turn + 1) % len(self._requests)
-            self._tries = 0
-        else:
-            self._tries += 1
-        if not answered:
-            self.now_ns = max(self.now_ns, request_end + int(host.timeout_ms * 1e6))
-        gap_ms = host.gap_ms * (1 + 0.1 * self._timing.random())
-        if self._turn % self._plan_end == 0:
-            gap_ms += host.pause_ms
-        self.now_ns += int(gap_ms * 1e6)
+        """Let the next station speak, at ``now_ns``, with what follows it; moves ``now_ns`` on to the one after."""
+        if not self._stations:
+            self.now_ns = NEVER
+            return []
+        station = min(self._stations, key=self._wish)
+        self.now_ns = max(self.now_ns, self._wish(station), self._free_ns)
+        self._last = station
+        sent = station.speak(self)
+        self._free_ns = max(self._free_ns, self.now_ns)
+        if station.due_ns >= NEVER:
+            self._stations.remove(station)
+        self.now_ns = self._next_wish()
         return sent
+
+    def _wish(self, station: Station) -> int:
+        """When this station would begin if nobody else did."""
+        if not station.listens:
+            return station.due_ns
+        rest = 0 if self._last in {None, station} else TURN_NS
+        return max(station.due_ns, self._free_ns + rest)
+
+    def _next_wish(self) -> int:
+        return min(map(self._wish, self._stations), default=NEVER)
 
     def ask(self, data: bytes, at_ns: int) -> list[Sent]:
         """Send what a client writes, at that time or as soon as the wire is free, with what the boards answer."""
-        self.now_ns = max(self.now_ns, at_ns)
-        sent, _, _ = self._exchange(data, CLIENT)
+        self.now_ns = max(self.now_ns if self.now_ns < NEVER else 0, at_ns)
+        sent = self.exchange(data, CLIENT).sent
+        self._free_ns = max(self._free_ns, self.now_ns)
         return sent
 
     def traffic(self) -> Iterator[Sent]:
-        """All that the polling host and the boards send, without end."""
-        while True:
+        """All that hosts, boards and others send; without end, unless nobody has anything to say any more."""
+        while self._stations:
             yield from self.poll()
 
     def pass_time(self, until_ns: int) -> None:
         """Let events happen and the batteries move up to that time."""
         while self._events and self._start_ns + self._events[-1].at_s * 1e9 <= until_ns:
-            self._happen()
+            self._happen(self._events.pop())
+        moved = False
         while self._next_tick_ns <= until_ns:
             for board in self.boards.values():
                 pack = board.battery.pack
                 if pack.speed:
                     board.battery.advance(pack.speed * TICK_NS / 1e9)
             self._next_tick_ns += TICK_NS
+            moved = True
+        if moved:
+            self._note_faults(self._next_tick_ns - TICK_NS)
+        for board in self.boards.values():
+            board.now_s = (until_ns - self._start_ns) / 1e9
 
-    def _happen(self) -> None:
-        event = self._events.pop()
+    def _happen(self, event: Event) -> None:
         board = self.boards[event.board]
+        at_ns = self._start_ns + int(event.at_s * 1e9)
         match event.what:
             case "sleep":
                 board.asleep = "silence" if event.name == "silence" else "echo"
+                self.truth.note(at_ns, "asleep", board=event.board)
             case "wake":
                 board.wake()
+                self.truth.note(at_ns, "awake", board=event.board)
             case "fault":
                 board.battery.forced.add(event.name)
             case "clear":
                 board.battery.forced -= {event.name} if event.name else set(board.battery.forced)
+            case _:
+                self._tricks.setdefault(event.board, []).append(_Trick(event))
         board.battery.refresh()
+        self._note_faults(at_ns)
 
-    def _exchange(self, request: bytes, sender: str) -> tuple[list[Sent], bool, int]:
-        """Put a request on the wire at ``now_ns``; the bytes heard, whether a good answer came, the request's end."""
+    def _note_faults(self, at_ns: int) -> None:
+        if not self.truth.on:
+            return
+        for number, board in self.boards.items():
+            faults = board.battery.reading.faults
+            for name in sorted(faults - self._faults[number]):
+                self.truth.note(at_ns, "fault_set", board=number, name=name)
+            for name in sorted(self._faults[number] - faults):
+                self.truth.note(at_ns, "fault_unset", board=number, name=name)
+            self._faults[number] = faults
+
+    # One exchange ----------------------------------------------------------------------------------------------------
+
+    def exchange(self, request: bytes, sender: str) -> Exchange:
+        """Put a request on the wire at ``now_ns``, with what answers it; moves ``now_ns`` to the end of that."""
         began = self.now_ns
         self.pass_time(began)
-        heard = self._damaged(request)
-        sent = [Sent(began, sender, heard)]
+        heard = self._damaged(request, began, sender)
+        sent = self._mixed(Sent(began, sender, heard))
         request_end = self.now_ns = began + self.wire_ns(heard)
-        if not is_request(heard):
-            return sent, False, request_end
-        good = False
+        if len(sent) > 1 or sent[0].data is not heard:
+            self.now_ns = max(piece.time_ns + self.wire_ns(piece.data) for piece in sent)
+            return Exchange(sent, False, request_end)
+        if request_length(heard) != len(heard) or not heard:
+            if request in heard:
+                self._note_unanswered(request, sender, began, "damaged")
+            return Exchange(sent, False, request_end)
+        good, complete, why = self._answers(heard, sent)
+        if not good:
+            self._note_unanswered(heard, sender, began, why)
+        if self.truth.on and writes(heard):
+            self._note_write(heard, sender, began, sent[1:])
+        return Exchange(sent, complete or why == "echo", request_end)
+
+    def _answers(self, request: bytes, sent: list[Sent]) -> tuple[bool, bool, str]:
+        """Let the boards answer; append what is heard. Whether a good reply came in time, and all of it; if not, why.
+
+        ``echo``: the request itself came back, which a careless host takes for an answer.
+        """
+        good, complete, why = False, False, "no such board"
         for number, board in self.boards.items():
-            answer = board.answer(heard)
+            tricks = self._tricks_on(number, request)
+            asleep, zero = board.asleep, board.zero_replies_left
+            board.lies = {event.name for event in tricks if event.what == "contradict"}
+            stranger = next((event for event in tricks if event.what == "other_board"), None)
+            answer = board.answer(self._meant_for(number, request) if stranger else request)
+            board.lies = set()
             if answer is None:
+                if board.listens_to(request):
+                    why = "asleep" if asleep else "not answered"
                 continue
-            good = True
+            if any(event.what == "silent" for event in tricks):
+                why = "silent"
+                continue
+            frames = self._tampered(list(answer.frames), number, tricks)
             name = f"board {number}"
-            jitter = board.board.habits.jitter_ms * self._timing.random()
-            self.now_ns += int((answer.delay_ms + jitter) * 1e6)
-            began = self.now_ns
-            length = 0
-            for data in answer.frames:
-                on_wire = self._damaged(data)
-                good = good and on_wire is data
-                sent.append(Sent(began + int(length * self._char_ns), name, on_wire))
-                length += len(on_wire)
-            self.now_ns = began + int(length * self._char_ns)
-        return sent, good, request_end
+            jitter = board.board.habits.jitter_ms * self.timing.random()
+            delay_ns = int((answer.delay_ms + jitter) * 1e6)
+            late = next((event for event in tricks if event.what == "late"), None)
+            if late is not None:
+                due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
+                self._stations.append(LateReply(due, name, frames))
+                self.truth.note(due, "late", board=number, delay_s=late.delay_ms / 1e3, **_about(request))
+                why = "late"
+                continue
+            quiet_from = self.now_ns
+            self.now_ns += delay_ns
+            if asleep:
+                self.truth.note(self.now_ns, "echo", **_about(request), address=request[1])
+            elif zero:
+                self.truth.note(self.now_ns, "zero_reply", board=number, **_about(request))
+            elif stranger:
+                self.truth.note(self.now_ns, "other_board", board=number, asked=request[1] - 0x3F, **_about(request))
+            harm = next((event for event in tricks if event.what == "damage"), None)
+            whole, some = self._speak(name, frames, sent, harm, silent_from_ns=quiet_from)
+            if asleep:
+                why = "echo" if whole else "damaged"
+            elif some and not stranger:
+                good, complete = True, whole
+                for event in tricks:
+                    if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]:
+                        self.truth.note(self.now_ns, "contradiction", board=number, name=event.name, **_about(request))
+                if self.truth.on and whole and not zero:
+                    self._note_faults_seen(number, request, frames)
+            elif not stranger:
+                why = "damaged"
+        return good, complete, why
 
-    def _damaged(self, data: bytes) -> bytes:
+    def _speak(
+        self,
+        name: str,
+        frames: list[bytes],
+        sent: list[Sent],
+        harm: Event | None = None,
+        *,
+        silent_from_ns: int | None = None,
+    ) -> tuple[bool, bool]:
+        """Put frames on the wire back to back, from ``now_ns`` on; whether all were heard well, and whether one was.
+
+        silent_from_ns: since when nobody has spoken; who does not listen may begin to speak in that time.
+        """
+        began, length, good, some = self.now_ns, 0, True, False
+        lost = silent_from_ns is not None and self._filled_gap(silent_from_ns, Sent(began, name, frames[0]), sent)
+        if lost:
+            frames, good = frames[1:], False
+            length = round((sent[-1].time_ns - began) / self._char_ns) + len(sent[-1].data)
+        for place, data in enumerate(frames, 1):
+            at = began + int(length * self._char_ns)
+            forced: Harm | None = None
+            if harm is not None and place == min(harm.frames, len(frames)):
+                forced = harm.name  # pyright: ignore[reportAssignmentType] - checked by Event
+            on_wire = self._damaged(data, at, name, forced)
+            pieces = self._mixed(Sent(at, name, on_wire))
+            good = good and len(pieces) == 1 and pieces[0].data is data
+            some = some or (len(pieces) == 1 and data in pieces[0].data)
+            sent += pieces
+            length += len(on_wire)
+            last = pieces[-1]
+            length = max(length, round((last.time_ns - began) / self._char_ns) + len(last.data))
+        self.now_ns = began + int(length * self._char_ns)
+        return good, some
+
+    def _filled_gap(self, since_ns: int, reply: Sent, sent: list[Sent]) -> bool:
+        """Let who does not listen speak between a request and its reply; whether that ran into the reply."""
+        for station in self._careless():
+            if since_ns <= station.due_ns < reply.time_ns and (said := station.barge_in(self)):
+                name, data, at = said
+                if at + self.wire_ns(data) <= reply.time_ns:
+                    sent.append(Sent(at, name, data))  # whole, but the board is busy
+                    self._note_unanswered(data, name, at, "busy")
+                    return False
+                both = overlaid(data, reply.data, round((reply.time_ns - at) / self._char_ns))
+                sent.append(Sent(at, f"{name}, {reply.sender}", both))
+                self.truth.note(at, "collision", senders=[name, reply.sender])
+                return True
+        return False
+
+    def say(self, data: bytes, sender: str) -> list[Sent]:
+        """Put bytes that nobody answers on the wire at ``now_ns``; moves it to their end."""
+        self.pass_time(self.now_ns)
+        sent: list[Sent] = []
+        self._speak(sender, [data], sent)
+        return sent
+
+    def _careless(self) -> list[Station]:
+        """Those who do not listen, but for the one that speaks now."""
+        return [station for station in self._stations if not station.listens and station is not self._last]
+
+    def _mixed(self, piece: Sent) -> list[Sent]:
+        """Return what is heard of a piece when stations that do not listen begin to speak during it."""
+        pieces = [piece]
+        end = piece.time_ns + self.wire_ns(piece.data)
+        for station in self._careless():
+            if piece.time_ns <= station.due_ns < end and (said := station.barge_in(self)):
+                name, data, at = said
+                heard = overlaid(piece.data, data, round((at - piece.time_ns) / self._char_ns))
+                pieces = [Sent(piece.time_ns, f"{piece.sender}, {name}", heard)]
+                self.truth.note(at, "collision", senders=[piece.sender, name])
+                return pieces
+        return pieces
+
+    # What goes wrong on demand ---------------------------------------------------------------------------------------
+
+    def _tricks_on(self, number: int, request: bytes) -> list[Event]:
+        """Events that wait for this board's next answer, and this is one; each use counts."""
+        waiting = self._tricks.get(number)
+        if not waiting:
+            return []
+        mine = self.boards[number].listens_to(request)
+        data_id = request[2] if request[0] == START else None
+        used: list[Event] = []
+        for trick in waiting:
+            event = trick.event
+            if mine == (event.what == "other_board"):
+                continue
+            if event.what == "other_board" and (request[0] != START or not 0x41 <= request[1] <= 0x4F):
+                continue
+            if event.what == "contradict" and data_id != LIE_IDS[event.name] and (data_id or event.name != "soc"):
+                continue
+            if event.what in {"cut_burst", "skip_frame", "repeat_frame"} and data_id not in {0x95, 0x96, 0x57}:
+                continue
+            if event.data_id is not None and event.data_id != data_id:
+                continue
+            used.append(trick.used())
+        self._tricks[number] = [trick for trick in waiting if trick.left > 0]
+        return used
+
+    def _meant_for(self, number: int, request: bytes) -> bytes:
+        """Return the same question, to another board."""
+        address = 0x3F + number
+        return bytes((START, address, *request[2:12], (sum(request[2:12]) + START + address) & 0xFF))
+
+    def _tampered(self, frames: list[bytes], number: int, tricks: list[Event]) -> list[bytes]:
+        """Leave out or repeat frames of a burst."""
+        for event in tricks:
+            if len(frames) < 2:
+                break
+            data_id, place = frames[0][2], event.frames
+            if event.what == "cut_burst" and place < len(frames):
+                self.truth.note(self.now_ns, "cut_burst", board=number, data_id=data_id, sent=place, of=len(frames))
+                frames = frames[:place]
+            elif event.what == "skip_frame" and place <= len(frames):
+                self.truth.note(self.now_ns, "skipped_frame", board=number, data_id=data_id, frame=place)
+                del frames[place - 1]
+            elif event.what == "repeat_frame" and place <= len(frames):
+                self.truth.note(self.now_ns, "repeated_frame", board=number, data_id=data_id, frame=place)
+                frames.insert(place, frames[place - 1])
+        return frames
+
+    def _damaged(self, data: bytes, at_ns: int, sender: str, forced: Harm | None = None) -> bytes:
         """Damage bytes as the wire does; mostly it does not, and the very object comes back."""
-        if self._harm is None:
-            return data
-        chance = self._harm.random
-        dice = chance()
-        if dice >= self.scenario.damage.total:
-            return data
-        return _harmed(data, dice, self.scenario.damage, self._harm)
+        damage = self.scenario.damage
+        if forced is None:
+            if not damage.total:
+                return data
+            dice = self._harm.random()
+            if dice >= damage.total:
+                return data
+            how, heard = harmed(data, dice, damage, self._harm)
+        else:
+            how, heard = harmed(data, forced, damage, self._harm)
+        if self.truth.on:
+            self.truth.note(at_ns, "damaged", sender=sender, how=how, sent=data.hex(), heard=heard.hex())
+        return heard
+
+    # What is written down --------------------------------------------------------------------------------------------
+
+    def _note_unanswered(self, request: bytes, sender: str, at_ns: int, why: str) -> None:
+        if self.truth.on:
+            facts = {"host": sender, "address": request[1], **_about(request), "why": why}
+            board = request[1] - 0x3F if request[0] == START else request[1] - modbus.ASKS_81
+            if 1 <= board <= 16:
+                facts["board"] = board
+            self.truth.note(at_ns, "unanswered", **facts)
+
+    def _note_write(self, request: bytes, sender: str, at_ns: int, replies: list[Sent]) -> None:
+        heard = [piece.data for piece in replies if piece.sender.startswith("board")]
+        reply = heard[0] if heard else b""
+        if request[0] == START:
+            data_id, same = request[2], reply[4:12] == request[4:12]
+            first = request[4] if data_id in {0xD9, 0xDA} else 1
+            if data_id in {0xD9, 0xDA, 0x21}:
+                taken = reply[4:5] == bytes((first,))
+                result = "confirmed" if taken else "denied"
+            else:
+                result = "confirmed" if same and data_id else "answered"
+            facts = {"dialect": "a5", "data_id": data_id, "value": request[4:12].hex()}
+        else:
+            result = "confirmed" if reply[1:2] == request[1:2] and reply[2:6] == request[2:6] else "denied"
+            dialect = "d2" if request[0] == modbus.D2 else "81"
+            facts = {"dialect": dialect, "register": int.from_bytes(request[2:4]), "value": request[4:-2].hex()}
+        self.truth.note(at_ns, "write", host=sender, **facts, result=result if reply else "none")
+
+    def _note_faults_seen(self, number: int, request: bytes, frames: list[bytes]) -> None:
+        """Note what a good reply with the fault bits tells that the one before it did not."""
+        if request[0] == START:
+            if request[2] != 0x98 or frames[0][2] != 0x98:
+                return
+            key = ("a5", number)
+        else:
+            asked = modbus.parse(request)
+            if asked is None or asked.writes or asked.address != modbus.D2:
+                return
+            if asked.register > 0x3A or asked.register + asked.count < 0x3E:
+                return
+            key = ("d2", number)
+        faults = self.boards[number].battery.reading.faults
+        before = self._seen_faults.get(key)
+        self._seen_faults[key] = faults
+        changes = [("fault_present" if before is None else "fault_raised", faults - (before or frozenset()))]
+        if before is not None:
+            changes.append(("fault_cleared", before - faults))
+        for what, names in changes:
+            for name in sorted(names):
+                self.truth.note(self.now_ns, what, board=number, name=name, dialect=key[0])
 
 
-def _harmed(data: bytes, dice: float, damage: Damage, harm: random.Random) -> bytes:
-    size = len(data)
-    place = int(harm.random() * size)
-    if dice < damage.drop:
-        lost = 1 + int(harm.random() * 3)
-        start = min(max(place, 1), size - 1)  # the first byte is still heard
-        return data[:start] + data[start + lost :]
-    dice -= damage.drop
-    if dice < damage.flip:
-        bit = 1 << int(harm.random() * 8)
-        return data[:place] + bytes((data[place] ^ bit,)) + data[place + 1 :]
-    dice -= damage.flip
-    if dice < damage.insert:
-        noise = bytes([int(harm.random() * 256) for _ in range(1 + int(harm.random() * 4))])
-        return data[:place] + noise + data[place:]
-    return data[: max(1, place)]
+def _about(request: bytes) -> dict[str, int]:
+    """Return what was asked for."""
+    if is_request(request) or request[:1] == bytes((START,)):
+        return {"data_id": request[2]}
+    return {"register": int.from_bytes(request[2:4])}
 
 
 def traffic(scenario: Scenario, start_ns: int = 0) -> Iterator[Sent]:
-    """All that a scenario's polling host and boards send, in order, without end, from that time on."""
+    """All that a scenario's hosts and boards send, in order, from that time on; without end while a host polls."""
     return Bus(scenario, start_ns).traffic()

@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Self
 
 from dalycapture.errors import CaptureError
 from dalytools.problem import Problem
-from dalytools.simulator.board import FRAME_BYTES, START, is_request
+from dalytools.simulator.board import may_become_request, request_length
 from dalytools.simulator.bus import BITS_A_BYTE, CLIENT, HOST, Bus, Sent
+from dalytools.simulator.modbus import MAX_REQUEST
 from dalytools.simulator.replay import open_replay
 from dalytools.simulator.scenario import Scenario
 from dalytools.simulator.terminal import Terminal
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
     from types import TracebackType
+
+    from dalytools.simulator.truth import Truth
 
 _GROUP_S = 0.004  # bytes are handed over in groups of about this length, as adapters do
 _HALF_FRAME_NS = 30_000_000  # how long the rest of a client's frame may take to come
@@ -55,9 +58,11 @@ class SimulatedBus:
         speed: float = 1.0,
         longest_silence_s: float = 2.0,
         link: Path | None = None,
+        truth: Truth | None = None,
     ) -> None:
         self.scenario = scenario or Scenario()
-        self.bus = Bus(self.scenario)
+        self.bus = Bus(self.scenario, truth=truth)
+        self.ended_ns = 0  # of bus time
         self.problem = ""  # one line, when the capture broke off
         baud = self.scenario.baud
         self._char_ns = BITS_A_BYTE * 1_000_000_000 / baud
@@ -137,6 +142,7 @@ class SimulatedBus:
             if self._then_simulate:
                 self._simulate(end_ns)
         finally:
+            self.ended_ns = self._now()
             self._done.set()
 
     def _now(self) -> int:
@@ -159,7 +165,7 @@ class SimulatedBus:
                 return
             while (due := item.time_ns + late_ns) > self._now() and not self._over(end_ns):
                 self._wait(due if end_ns is None else min(due, end_ns), for_client=True)
-                if said := self._from_client(FRAME_BYTES):
+                if said := self._from_client():
                     late_ns += max(0, self._put([Sent(self._now(), CLIENT, said)], self._char_ns) - due)
             self._put([Sent(due, item.sender, item.data)], char_ns)
 
@@ -168,12 +174,12 @@ class SimulatedBus:
         bus.now_ns = max(bus.now_ns, self._now())
         while not self._over(end_ns):
             now = self._now()
-            if said := self._from_client(FRAME_BYTES):
+            if said := self._from_client():
                 self._put(self._asked(said, now), self._char_ns)
                 self._client_until_ns = self._now() + _CLIENT_FIRST_NS
                 continue
             due = None
-            if self.scenario.host.polls:
+            if bus.speaks:
                 due = max(bus.now_ns, self._client_until_ns)
                 if due <= now and not self._inbox:
                     bus.now_ns = max(due, now - _BEHIND_NS)
@@ -194,17 +200,17 @@ class SimulatedBus:
         bus.now_ns = max(planned, bus.now_ns)
         return sent
 
-    def _from_client(self, whole: int) -> bytes:
+    def _from_client(self) -> bytes:
         """Take the next bytes of a client that may go on the wire: a whole request, or what will not become one."""
         inbox = self._inbox
-        for start in range(len(inbox) - whole + 1):
-            if is_request(inbox[start : start + whole]):
-                size = start or whole  # what stands before it goes first, by itself
+        waiting = self._now() - self._inbox_ns < _HALF_FRAME_NS
+        size = len(inbox)
+        for start in range(len(inbox)):
+            if length := request_length(inbox[start : start + MAX_REQUEST]):
+                size = start or length  # what stands before it goes first, by itself
                 break
-        else:
-            waiting = self._now() - self._inbox_ns < _HALF_FRAME_NS
-            beginning = inbox.find(START, max(0, len(inbox) - whole + 1))
-            size = beginning if waiting and beginning >= 0 else len(inbox)
+            if waiting and size == len(inbox) and may_become_request(inbox[start : start + MAX_REQUEST]):
+                size = start
         size = min(size, _MOST_AT_ONCE)
         self._inbox = inbox[size:]
         return inbox[:size]

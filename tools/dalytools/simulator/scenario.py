@@ -5,18 +5,45 @@ Scenario
   boards: Board ...        which addresses, and for each
     pack: Pack             the battery behind it
     habits: Habits         how its firmware answers
-  host: Host               who polls, what and how often
+    texts: Texts           what it says of itself
+  host, other_hosts: Host  who polls, what and how often
+  foreign: Foreign ...     who else is on the wire
   damage: Damage           what happens to bytes on the wire
   events: Event ...        what happens when
+
+As a file: scenario_file.py.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
+from dalytools.simulator.chemistry import CHEMISTRIES
 from dalytools.simulator.faults import FAULT_BITS
+from dalytools.simulator.settings import Texts
 
+Dialect = Literal["a5", "d2", "81"]
+Writes = Literal["accept", "ignore", "silent"]
+Lie = Literal[
+    "pack_voltage", "cell_max", "cell_min", "cell_number", "temperature_max", "temperature_min", "sensor_number", "soc"
+]
+Harm = Literal["drop", "flip", "insert", "cut", "collide"]
+What = Literal[
+    "sleep",
+    "wake",
+    "fault",
+    "clear",
+    "send",
+    "silent",
+    "late",
+    "cut_burst",
+    "skip_frame",
+    "repeat_frame",
+    "other_board",
+    "contradict",
+    "damage",
+]
 Reserved = Literal["stale", "zero", "ff"]
 Asleep = Literal["", "echo", "silence"]
 
@@ -43,7 +70,7 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class Pack:
-    """The battery: LFP cells in series. ``speed`` 0 stands still, 1 is real time, 60 shows an hour in a minute."""
+    """The battery: cells in series. ``speed`` 0 stands still, 1 is real time, 60 shows an hour in a minute."""
 
     cells: int = 16
     sensors: int = 2
@@ -55,8 +82,11 @@ class Pack:
     ripple: float = 0.04  # of the current, changes every half second
     spread: float = 0.01  # of each cell's capacity and resistance, and of its charge at the start
     speed: float = 1.0
+    chemistry: str = "lfp"
+    production_date: tuple[int, int, int] = (2024, 3, 15)
 
     def __post_init__(self) -> None:
+        _require(self.chemistry in CHEMISTRIES, f"chemistry {self.chemistry!r}: {', '.join(CHEMISTRIES)}")
         _require(1 <= self.cells <= MAX_CELLS, f"{self.cells} cells: a Daly board has 1 to {MAX_CELLS}")
         _require(1 <= self.sensors <= MAX_SENSORS, f"{self.sensors} sensors: a Daly board has 1 to {MAX_SENSORS}")
         _require(0 <= self.start_soc <= 100, f"a state of charge of {self.start_soc} %: must be 0 to 100")
@@ -77,6 +107,9 @@ class Habits:
     jitter_ms: float = 1.5
     echo_ms: float = 4.0  # a sleeping board gives the request back after
     zero_replies: int = 10  # replies that are all zero after waking up (field notes b, sleep)
+    writes: Writes = "accept"  # ignore: answered with the old state; silent: not answered
+    unanswered: tuple[int, ...] = ()  # data IDs that this firmware does not know
+    alarm_grid: bool = False  # whether it answers 70 to 8A (field notes a.2: one source; another board is silent)
 
     def __post_init__(self) -> None:
         _require(self.frame_base in {0, 1}, f"frame numbers from {self.frame_base}: must be 0 or 1")
@@ -93,8 +126,13 @@ class Board:
     habits: Habits = field(default_factory=Habits)
     asleep: Asleep = ""
     faults: tuple[str, ...] = ()
+    dialects: tuple[Dialect, ...] = ("a5",)  # some boards answer all three on one port (field notes e)
+    texts: Texts = field(default_factory=Texts)
 
     def __post_init__(self) -> None:
+        _require(bool(self.dialects), "a board speaks at least one dialect: a5, d2, 81")
+        for dialect in self.dialects:
+            _require(dialect in get_args(Dialect), f"dialect {dialect!r}: a5, d2 or 81")
         _require(1 <= self.number <= MAX_BOARDS, f"board {self.number}: boards are numbered 1 to {MAX_BOARDS}")
         _require(self.asleep in {"", "echo", "silence"}, f"asleep {self.asleep!r}: echo or silence")
         for name in self.faults:
@@ -105,7 +143,11 @@ class Board:
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """Who polls. ``address`` None: each board by its own, 0x3F+N; else this one address only."""
+    """Who polls. ``address`` None: each board by its own, 0x3F+N; else this one address only (A5 alone).
+
+    A host that ``listens`` waits until the wire is free; one that does not speaks when its time has come, and what it
+    says then is mixed with what is on the wire.
+    """
 
     polls: bool = True
     address: int | None = None
@@ -115,8 +157,18 @@ class Host:
     pause_ms: float = 0.0  # more of it after a whole plan
     timeout_ms: float = 500.0
     retries: int = 2
+    name: str = "host"
+    dialect: Dialect = "a5"
+    reads: tuple[tuple[int, int], ...] = ()  # Modbus: (first register, count); none: what Daly's app reads
+    boards: tuple[int, ...] = ()  # which boards it asks; none: all
+    listens: bool = True
+    start_s: float = 0.0
+    stop_s: float = 0.0  # 0: never
 
     def __post_init__(self) -> None:
+        for register, count in self.reads:
+            fine = register >= 0 and register + count <= 0x10000 and 1 <= count <= 125
+            _require(fine, f"a read of {count} registers from {register}: 1 to 125, from 0 to 65535")
         fine = self.address is None or 0x20 <= self.address <= 0xFF
         _require(
             fine, f"host address {self.address}: hosts have 0x20 to 0xff (0x40 RS-485, 0x80 app, 0x41 asks board 2)"
@@ -126,41 +178,90 @@ class Host:
 
 
 @dataclass(frozen=True, slots=True)
+class Foreign:
+    """Somebody else on the wire, who says the same thing again and again, and may be answered.
+
+    data: on a serial line, or the payload of a CAN frame with ``can_id``; a CAN station is not heard on other wires.
+    """
+
+    data: bytes
+    period_s: float = 1.0
+    start_s: float = 0.0
+    answer: bytes = b""
+    answer_ms: float = 20.0
+    can_id: int | None = None
+    name: str = "foreign"
+
+    def __post_init__(self) -> None:
+        _require(self.period_s > 0, f"a period of {self.period_s} s: must be more than 0")
+        if self.can_id is None:
+            _require(0 < len(self.data) <= 256, "a foreign station says 1 to 256 bytes")
+        else:
+            _require(len(self.data) <= 8, "a CAN frame holds at most 8 bytes")
+            _require(0 <= self.can_id < 1 << 29, f"CAN identifier {self.can_id}: 0 to 0x1fffffff")
+
+
+@dataclass(frozen=True, slots=True)
 class Damage:
-    """Shares of frames (0..1 each, together at most 1) that the wire damages, in one of four ways."""
+    """Shares of frames (0..1 each, together at most 1) that the wire damages, in one of five ways."""
 
     drop: float = 0.0  # one to three bytes out of the middle are lost
     flip: float = 0.0  # one bit is wrong
     insert: float = 0.0  # one to four bytes that nobody sent
     cut: float = 0.0  # the end is missing
+    collide: float = 0.0  # somebody speaks at the same time: both are lost from there on
 
     def __post_init__(self) -> None:
-        rates = (self.drop, self.flip, self.insert, self.cut)
+        rates = (self.drop, self.flip, self.insert, self.cut, self.collide)
         _require(min(rates) >= 0 and self.total <= 1, f"damage to {self.total} of the frames: must be 0 to 1 in all")
 
     @property
     def total(self) -> float:
         """Share of frames damaged in any way."""
-        return self.drop + self.flip + self.insert + self.cut
+        return self.drop + self.flip + self.insert + self.cut + self.collide
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """At a time (seconds of bus time) something happens to a board.
+    """At a time (seconds of bus time) something happens, to a board where nothing else is said.
 
-    ``sleep`` (name "echo" or "silence"), ``wake``, ``fault`` and ``clear`` (name of a fault; "" clears all).
+    ``sleep`` (name "echo" or "silence"), ``wake``
+    ``fault``, ``clear`` (name of a fault; "" clears all)
+    ``send``: a host puts ``data`` on the wire, as soon as it is free
+    and, for the next ``times`` requests to the board that it would answer (of ``data_id``, where one is given):
+    ``silent``: it does not answer
+    ``late``: its answer comes ``delay_ms`` late, in between what was asked meanwhile
+    ``cut_burst``: it stops after ``frames`` frames; ``skip_frame``, ``repeat_frame``: number ``frames`` of the burst
+    ``other_board``: this board answers, too and first, what another one was asked
+    ``contradict``: its answer says something that other answers do not (name: one of Lie)
+    ``damage``: its answer is damaged on the wire (name: one of Harm), in frame number ``frames``
     """
 
     at_s: float
-    what: Literal["sleep", "wake", "fault", "clear"]
+    what: What
     board: int = 1
     name: str = ""
+    data: bytes = b""
+    sender: str = "host"
+    times: int = 1
+    data_id: int | None = None
+    delay_ms: float = 1500.0
+    frames: int = 1
 
     def __post_init__(self) -> None:
+        _require(self.what in get_args(What), f"there is no event {self.what!r}: {', '.join(get_args(What))}")
         if self.what == "fault" or (self.what == "clear" and self.name):
             _require(self.name in FAULT_BITS, f"there is no fault {self.name!r}")
         if self.what == "sleep":
             _require(self.name in {"", "echo", "silence"}, f"asleep {self.name!r}: echo or silence")
+        if self.what == "contradict":
+            _require(self.name in get_args(Lie), f"contradict {self.name!r}: {', '.join(get_args(Lie))}")
+        if self.what == "damage":
+            _require(self.name in get_args(Harm), f"damage {self.name!r}: {', '.join(get_args(Harm))}")
+        if self.what == "send":
+            _require(0 < len(self.data) <= 256, "what is sent has 1 to 256 bytes")
+        _require(self.at_s >= 0, f"an event at {self.at_s} s: must be 0 or later")
+        _require(self.times > 0 and self.frames > 0, "times and frames must be 1 or more")
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +274,18 @@ class Scenario:
     host: Host = field(default_factory=Host)
     damage: Damage = field(default_factory=Damage)
     events: tuple[Event, ...] = ()
+    other_hosts: tuple[Host, ...] = ()
+    foreign: tuple[Foreign, ...] = ()
+    about: str = ""
+    story: str = ""  # of the field notes, such as g.1
+    wire: str = "uart"  # what it is shown on when nothing else is asked for
+    duration_s: float = 60.0
+    start_ns: int = 1_767_225_600 * 10**9  # 2026-01-01 00:00:00 UTC
+
+    @property
+    def hosts(self) -> tuple[Host, ...]:
+        """All hosts that poll."""
+        return tuple(host for host in (self.host, *self.other_hosts) if host.polls)
 
     def __post_init__(self) -> None:
         numbers = [board.number for board in self.boards]
