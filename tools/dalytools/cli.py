@@ -26,11 +26,15 @@ COMMANDS = {
     "decode": "show what the reference decoder reads in a capture",
     "check": "hold the Wireshark dissector against the reference decoder",
     "reframe": "cut an old capture, or a raw log, into records again",
+    "import": "a log of another tool becomes a capture",
     "install": "dissector, profile and capture tool into Wireshark's personal folders",
     "uninstall": "take them away again",
     "doctor": "what is there, what is missing, and how to get it",
     "simulate": "a bus with boards and a host on pseudo-terminals",
 }
+
+MODULES = {"import": "import_log"}
+"""Those that can't be named as their command: Python has the word."""
 
 EXIT_PROBLEM = 2
 
@@ -65,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         top.print_help()
         return EXIT_PROBLEM
     command: str = top.parse_args(words[:1]).command
-    module = importlib.import_module(f"dalytools.commands.{command}")
+    module = importlib.import_module(f"dalytools.commands.{MODULES.get(command, command)}")
     parser = _Parser(prog=f"dalyshark {command}", allow_abbrev=False)
     add_arguments: Callable[[argparse.ArgumentParser], None] = module.add_arguments
     run: Callable[[argparse.Namespace], int] = module.run

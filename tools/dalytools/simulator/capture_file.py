@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from dalycapture.create import open_writer
+from dalycapture.create import new_capture
 from dalycapture.errors import CaptureError
 from dalytools import __version__
 from dalytools.problem import Problem
@@ -68,9 +68,10 @@ def write_capture(
     end_ns = until_ns
     try:
         with (
-            open_writer(path, file_format, application=f"dalyshark {__version__}") as writer,
+            new_capture(path, file_format, application=f"dalyshark {__version__}") as writer,
             progress_bar("simulate") as advance,
         ):
+            writer.origin = f"made by dalyshark simulate, seed {scenario.seed}"
             interface = writer.add_interface(carrier.interface)
 
             def put(made: Iterable[WirePacket]) -> None:

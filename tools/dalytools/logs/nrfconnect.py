@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The log of nRF Connect for Mobile, as it exports it.
+
+    nRF Connect, 2026-08-26
+    I	19:33:31.001	Data written to 0000fff2-0000-1000-8000-00805f9b34fb, value: (0x) D2-03-00-00-00-3E-D7-B9
+    I	19:33:31.152	Notification received from 0000fff1-0000-1000-8000-00805f9b34fb, value: (0x) D2-03-7C-..
+    19:33:31.152	Updated Value of Characteristic FFF1 to 0xD2037C..                         on iOS
+
+The date stands in the first line. Values of other characteristics (battery level, device name) are known and left out,
+as are the callbacks that tell the same bytes again. Sources: patman15/BMS_BLE-HA 806, and other public logs of the app.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from dalytools.logs.entry import IN, OUT, Entry, PlainLineLog
+from dalytools.logs.hexbytes import hex_bytes
+from dalytools.logs.stamps import split_stamp
+
+_HEAD = re.compile(r"\s*nRF Connect(?: for Mobile)?,? *(\d{4}-\d\d-\d\d)?.{0,60}", re.IGNORECASE)
+_LEVEL = re.compile(r"\s*[ADVIWE][\t ]+")
+_VALUE = re.compile(
+    r"(?:\"|\[Callback\] )?(?P<what>Data written to|Notification received from|Indication received from)"
+    r" (?P<uuid>[0-9A-Fa-f-]{4,36}),? value: \(0x\) (?P<hex>[0-9A-Fa-f-]+).{0,100}"
+)
+_IOS = re.compile(r"Updated Value of Characteristic (?P<uuid>[0-9A-Fa-f-]{4,36}) to (?:0x)?(?P<hex>[0-9A-Fa-f ]+)\.?")
+_OURS = {"fff1", "fff2", "ff01", "ff02"}
+
+
+class NrfConnect(PlainLineLog):
+    """A log of nRF Connect."""
+
+    name = "nrfconnect"
+    about = "nRF Connect's log: Notification received from 0000fff1-.., value: (0x) A5-01-.."
+
+    def __init__(self) -> None:
+        self._day_ns = 0
+        self._headed = False
+
+    def parse(self, line: str) -> list[Entry] | None:
+        """Read a line."""
+        head = _HEAD.fullmatch(line)
+        if head:
+            self._headed = True
+            stamp, _ = split_stamp(f"{head[1]} 00:00:00") if head[1] else (None, "")
+            self._day_ns = stamp.ns if stamp else 0
+            return []
+        level = _LEVEL.match(line)
+        stamp, rest = split_stamp(line[level.end() :] if level else line)
+        if stamp is not None and stamp.what == "day" and self._day_ns:
+            stamp = replace(stamp, what="moment", ns=self._day_ns + stamp.ns)
+        found = _VALUE.fullmatch(rest.strip()) or _IOS.fullmatch(rest.strip())
+        if found:
+            data = hex_bytes(found["hex"])
+            uuid = found["uuid"].lower()
+            short = uuid[4:8] if len(uuid) == 36 else uuid
+            if data is None:
+                return None
+            if short not in _OURS:
+                return []
+            out = "what" in found.groupdict() and found["what"].startswith("Data written")
+            return [Entry(data, stamp, OUT if out else IN)]
+        known = self._headed and (level is not None or stamp is not None or line.startswith((" ", "-", "\t", "DL-")))
+        return [] if known or (self._headed and re.match(r"[\w ]{3,60}\(", line)) else None
