@@ -38,9 +38,9 @@ def test_a_log_becomes_records_with_directions_and_origin(tmp_path: Path) -> Non
     log.write_text(f"12:00:00.100 TX {ASK}\nhello\x1b[2J\n12:00:00.150 RX {ANSWER} {ANSWER}\n", encoding="utf-8")
     done = imported(log, "-w", out, "--date", "2026-11-21", "-v")
     assert done.returncode == 0
+    about = KINDS["hex"]().about
     assert done.stderr.splitlines() == [
-        "dalyshark import: my.log: guessed hex (lines of hex bytes, with or without times and TX, RX: RealTerm, HTerm, "
-        "CoolTerm, pasted logs): 2 of the first 3 lines fit",
+        f"dalyshark import: my.log: guessed hex ({about}): 2 of the first 3 lines fit",
         "dalyshark import: line 2: hello\\x1b[2J",
         f"dalyshark import: {out}: 2 lines with bytes of 3, 39 bytes; 3 records (3 frame)",
         "dalyshark import: 1 line was not understood",
