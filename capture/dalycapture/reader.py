@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Read any capture file we know: pcapng or classic pcap, plain or gzip-compressed, from a path or standard input."""
+"""Read any capture file we know, plain or gzip-compressed, from a path or standard input.
+
+pcapng, classic pcap, btsnoop (Bluetooth), and the text logs of ``candump -L`` (CAN).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dalycapture import candump
+from dalycapture.btsnoop import MAGIC as _BTSNOOP
+from dalycapture.btsnoop import read_btsnoop
 from dalycapture.errors import CaptureError, TruncatedError
 from dalycapture.output import reason
 from dalycapture.pcap import MICROSECONDS, NANOSECONDS, read_pcap
@@ -37,11 +43,11 @@ _OTHERS = (
 def read_capture(path: Path | str, told: Told | None = None) -> Iterator[CapturedPacket]:
     """Yield the packets of a capture file, in order, numbered from 1 as Wireshark numbers them.
 
-    path: pcapng or classic pcap, either also gzip-compressed; ``-`` is standard input. told: who hears of interfaces
-    and statistics. Packets of every link type come, with their ``link_type``; DALY_LINK_TYPES (dalycapture.linktype)
-    says which hold our serial bytes. Memory is bounded by one block of at most 16 MiB. Raises CaptureError (one line)
-    when the file is missing, no capture, or damaged, and TruncatedError after the last whole packet when it ends in the
-    middle of one.
+    path: pcapng, classic pcap, btsnoop or a log of candump, each also gzip-compressed; ``-`` is standard input. told:
+    who hears of interfaces and statistics. Packets of every link type come, with their ``link_type``; DALY_LINK_TYPES
+    (dalycapture.linktype) says which hold our serial bytes. Memory is bounded by one block of at most 16 MiB. Raises
+    CaptureError (one line) when the file is missing, no capture, or damaged, and TruncatedError after the last whole
+    packet when it ends in the middle of one.
     """
     name = "standard input" if str(path) == "-" else str(path)
     with ExitStack() as stack:
@@ -77,6 +83,10 @@ def _plain(source: Source, told: Told | None) -> Iterator[CapturedPacket]:
         yield from read_pcapng(source, told)
     elif magic in _PCAP:
         yield from read_pcap(source, told)
+    elif source.peek(len(_BTSNOOP)) == _BTSNOOP:
+        yield from read_btsnoop(source, told)
+    elif candump.looks_like(source.peek(64)):
+        yield from candump.read_candump(source, told)
     elif magic and any(whole.startswith(magic) for whole in (_PCAPNG, *_PCAP)):
         raise TruncatedError(f"{source.name}: cut off in the middle of its header, after {len(magic)} bytes")
     else:

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class Readable(Protocol):
@@ -40,3 +43,20 @@ class Source:
         if len(self._ahead) < size:
             self._ahead += self._stream.read(size - len(self._ahead))
         return self._ahead[:size]
+
+    def lines(self, longest: int) -> Iterator[bytes]:
+        """Yield the lines that are left, with their ends; one longer than `longest` bytes in pieces of that length."""
+        held = b""
+        while chunk := self.read(1 << 16):
+            *whole, held = (held + chunk).splitlines(keepends=True)
+            if held.endswith(b"\n"):
+                whole.append(held)
+                held = b""
+            for line in whole:
+                for at in range(0, len(line), longest):
+                    yield line[at : at + longest]
+            while len(held) > longest:
+                yield held[:longest]
+                held = held[longest:]
+        if held:
+            yield held

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """From packets to decoded records, in the order of the file (docs/records.md, all of it).
 
-    packets -> streams (cut, time) -> file order -> buses (meaning) -> held until nothing can be added -> out
+    packets    -> streams (cut, time) -+-> file order -> buses (meaning) -> held until nothing can be added -> out
+    CAN frames -> recognised          -+
 
 Memory is bounded whatever the capture holds: see the limits below.
 """
@@ -15,17 +16,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalyref.bus import Bus
+from dalyref.can_bus import CanBus, Meaning
 from dalyref.kinds import Dialect, Kind
 from dalyref.message import from_serial
 from dalyref.options import NANO, Options
-from dalyref.packet import SERIAL_LINK_TYPES
+from dalyref.packet import SERIAL_LINK_TYPES, CanFrame
 from dalyref.streams import Located, Stream
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from dalyref.kinds import Record
-    from dalyref.packet import Direction, Packet
+    from dalyref.packet import Direction, Packet, Transport
     from dalyref.slate import Slate
     from dalyref.values import Fields
 
@@ -39,6 +41,9 @@ _LATE_ELSEWHERE_NS = 10 * NANO
 _MOST_HELD = 65536
 _MOST_WAITING_STREAMS = 64
 _MOST_STREAMS = 4096
+
+_StreamKey = tuple[int | str, str]
+"""Interface, or connection; and direction."""
 
 _BUS_NAME = re.compile(r"bus=([^\s,;]+)")
 
@@ -56,9 +61,19 @@ class Decoded:
     fields: Fields = field(default_factory=dict)
     interface: int = 0
     direction: Direction = ""
-    transport: str = "uart"
+    transport: Transport = "uart"
     comment: str = ""
     """The packet's comment, of an event its text: not from the wire, and not to be trusted."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Recognised:
+    """A CAN frame that is ours."""
+
+    frame: CanFrame
+    bus: CanBus
+    meaning: Meaning
+    foreign: str
 
 
 class Decoder:
@@ -66,11 +81,12 @@ class Decoder:
 
     def __init__(self, options: Options | None = None) -> None:
         self._options = options or Options()
-        self._streams: dict[tuple[int, Direction], Stream] = {}
-        self._waiting: dict[tuple[int, Direction], Stream] = {}  # those that hold bytes
-        self._buses: dict[int | str, Bus] = {}
-        self._bus_of: dict[int, tuple[str, Bus]] = {}  # by interface: its description, its bus
-        self._ordered: list[tuple[int, int, Located]] = []  # heap by packet number and place
+        self._streams: dict[_StreamKey, Stream] = {}
+        self._waiting: dict[_StreamKey, Stream] = {}  # those that hold bytes
+        self._buses: dict[tuple[Transport, int | str], Bus] = {}
+        self._bus_of: dict[int, tuple[str, Bus]] = {}  # by serial interface: its description, its bus
+        self._can_buses: dict[int, CanBus] = {}  # by interface
+        self._ordered: list[tuple[int, int, Located | _Recognised]] = []  # heap by packet number and place
         self._place = 0
         self._held: deque[tuple[Decoded, Slate | None]] = deque()
         self._now_ns = 0
@@ -79,17 +95,21 @@ class Decoder:
     def feed(self, packet: Packet) -> list[Decoded]:
         """Take the next packet of the file; return the records that are final, in the order of the file.
 
-        Packets of other link types than a serial line's (147 to 162) are passed over.
+        Passed over: serial packets of other link types than a serial line's (147 to 162), CAN frames that are not ours.
         """
-        if packet.link_type not in SERIAL_LINK_TYPES:
+        if isinstance(packet, CanFrame):
+            return self._feed_can(packet)
+        serial = packet.transport == "uart"
+        if serial and packet.link_type not in SERIAL_LINK_TYPES:
             return []
-        self._latest_ns = max(self._latest_ns, packet.time_ns)
-        key = (packet.interface, packet.direction)
+        if serial or packet.data:
+            self._latest_ns = max(self._latest_ns, packet.time_ns)
+        key = (packet.interface if serial else packet.connection, packet.direction)
         stream = self._streams.get(key)
         if stream is None:
-            stream = self._new_stream(key)
+            stream = self._new_stream(key, packet.transport)
         self._order(stream.feed(packet))
-        if not packet.data:
+        if serial and not packet.data:
             self._order((Located(None, packet, packet.time_ns, packet.time_ns),))
         if stream.waits_from is not None:
             self._waiting[key] = stream
@@ -108,12 +128,30 @@ class Decoder:
         self._release()
         return self._final(everything=True)
 
-    def _new_stream(self, key: tuple[int, Direction]) -> Stream:
+    def _feed_can(self, frame: CanFrame) -> list[Decoded]:
+        """Take a CAN frame: it is a record by itself, or not ours."""
+        bus = self._can_buses.get(frame.interface)
+        if bus is None:
+            if len(self._can_buses) >= _MOST_STREAMS:
+                self._can_buses.clear()
+            bus = self._can_buses[frame.interface] = CanBus(self._options)
+        recognised = bus.recognise(frame)
+        if recognised is None:
+            return []
+        self._latest_ns = max(self._latest_ns, frame.time_ns)
+        self._place += 1
+        heapq.heappush(self._ordered, (frame.number, self._place, _Recognised(frame, bus, *recognised)))
+        if len(self._ordered) > _MOST_HELD:
+            self._give_up(None, frame.time_ns)
+        self._release()
+        return self._final()
+
+    def _new_stream(self, key: _StreamKey, transport: Transport) -> Stream:
         if len(self._streams) >= _MOST_STREAMS:
             oldest = next(iter(self._streams))
             self._waiting.pop(oldest, None)
             self._order(self._streams.pop(oldest).flush())
-        stream = self._streams[key] = Stream(self._options)
+        stream = self._streams[key] = Stream(self._options, transport)
         return stream
 
     def _order(self, located: Iterable[Located]) -> None:
@@ -121,7 +159,7 @@ class Decoder:
             self._place += 1
             heapq.heappush(self._ordered, (item.packet.number, self._place, item))
 
-    def _give_up(self, present: tuple[int, Direction], time_ns: int) -> None:
+    def _give_up(self, present: _StreamKey | None, time_ns: int) -> None:
         """Flush streams that have been silent for long, so that they do not hold up the others."""
         late = [
             key
@@ -141,22 +179,52 @@ class Decoder:
         else:
             barrier = min(number for stream in self._waiting.values() if (number := stream.waits_from) is not None)
         while ordered and (barrier is None or ordered[0][0] <= barrier):
-            self._decode(heapq.heappop(ordered)[2])
+            item = heapq.heappop(ordered)[2]
+            if isinstance(item, _Recognised):
+                self._decode_can(item)
+            else:
+                self._decode(item)
 
     def _bus(self, packet: Packet) -> Bus:
+        if packet.transport != "uart":
+            return self._bus_named((packet.transport, packet.connection))
         known = self._bus_of.get(packet.interface)
         if known is not None and known[0] == packet.description:
             return known[1]
         named = _BUS_NAME.search(packet.description)
-        key = named[1] if named else packet.interface
+        bus = self._bus_named(("uart", named[1] if named else packet.interface))
+        self._bus_of[packet.interface] = (packet.description, bus)
+        return bus
+
+    def _bus_named(self, key: tuple[Transport, int | str]) -> Bus:
         bus = self._buses.get(key)
         if bus is None:
             if len(self._buses) >= _MOST_STREAMS:
                 self._buses.clear()
                 self._bus_of.clear()
             bus = self._buses[key] = Bus(self._options)
-        self._bus_of[packet.interface] = (packet.description, bus)
         return bus
+
+    def _decode_can(self, item: _Recognised) -> None:
+        frame = item.frame
+        self._now_ns = max(self._now_ns, frame.time_ns)
+        kind = item.bus.kind(item.meaning)
+        fields: Fields = {"daly.kind": kind.value, "daly.transport": "can"}
+        if item.foreign:
+            fields["daly.foreign"] = item.foreign
+        slate = item.bus.take(Located(None, frame, frame.time_ns, frame.time_ns), frame, item.meaning, fields)
+        decoded = Decoded(
+            frame.number,
+            frame.time_ns,
+            kind,
+            frame.data,
+            fields,
+            frame.interface,
+            frame.direction,
+            "can",
+            frame.comment,
+        )
+        self._held.append((decoded, slate))
 
     def _decode(self, located: Located) -> None:
         packet, record = located.packet, located.record
@@ -164,7 +232,7 @@ class Decoder:
         bus.now_ns = max(bus.now_ns, located.start_ns)
         self._now_ns = max(self._now_ns, located.start_ns)
         kind, data = (record.kind, record.data) if record is not None else (Kind.EVENT, b"")
-        fields: Fields = {"daly.kind": kind.value, "daly.transport": "uart"}
+        fields: Fields = {"daly.kind": kind.value, "daly.transport": packet.transport}
         slate: Slate | None = None
         if record is not None:
             _describe(record, fields)
@@ -178,7 +246,8 @@ class Decoder:
             fields,
             packet.interface,
             packet.direction,
-            comment=packet.comment,
+            packet.transport,
+            packet.comment,
         )
         self._held.append((decoded, slate))
 

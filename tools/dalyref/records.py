@@ -15,7 +15,7 @@ end of the segment follows it directly, for a frame cut off and the one behind i
 
 from __future__ import annotations
 
-from dalyref import a5, heads, modbus
+from dalyref import a5, bluetooth_module, heads, modbus
 from dalyref.gaps import Gap
 from dalyref.kinds import Dialect, Kind, Record
 
@@ -98,6 +98,14 @@ def _dialect(head: int) -> Dialect:
     return Dialect.D2 if head == 0xD2 else Dialect.P81
 
 
+def _frame(start: int, window: bytes) -> Record:
+    """Make the record of a good window."""
+    dialect = _dialect(window[0])
+    if dialect is not Dialect.A5 and bluetooth_module.is_modbus(window):
+        return Record(start, window, Kind.FOREIGN, foreign=bluetooth_module.NAME)
+    return Record(start, window, Kind.FRAME, dialect)
+
+
 class Splitter:
     """Cuts one stream that comes in pieces. However it is cut into pieces, the records are the same.
 
@@ -117,6 +125,11 @@ class Splitter:
     def pending(self) -> int:
         """Number of bytes held because later ones may change their record."""
         return len(self._data)
+
+    @property
+    def begun(self) -> bool:
+        """Tell whether the bytes so far end in what may still become a frame."""
+        return self._scan < len(self._data)
 
     def feed(self, data: bytes) -> list[Record]:
         """Take the next bytes of the stream; return the records that are now certain."""
@@ -162,7 +175,7 @@ class Splitter:
                 break
             if start > at:
                 self._gap.cut(data, at, start, base, out, closed=True)
-            out.append(Record(base + start, data[start:stop], Kind.FRAME, _dialect(data[start])))
+            out.append(_frame(base + start, data[start:stop]))
             at = scan = stop
         if at:
             self._gap.shift(at)

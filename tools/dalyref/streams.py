@@ -5,7 +5,8 @@ packet   |---- 13 ----|--- 7 ---|--------- 19 ---------|        as captured: cut
 record   |-- frame ---|---- frame ----|-- frame --|junk|        as decoded
 number         1              3            3        3           of the packet in which the record ends
 
-Time decides nothing here but when an incomplete record is given up.
+Time decides nothing here but when an incomplete record is given up. On Bluetooth and TCP it does not even that, and a
+frame takes no time (docs/wires.md, 3 and 4).
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dalyref import bluetooth_module
+from dalyref.kinds import Kind, Record
 from dalyref.records import Splitter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from dalyref.kinds import Record
     from dalyref.options import Options
-    from dalyref.packet import Packet
+    from dalyref.packet import Packet, Transport
 
 
 @dataclass(slots=True, eq=False)
@@ -38,12 +40,13 @@ class Located:
 
 
 class Stream:
-    """All bytes of one interface and one direction."""
+    """All bytes of one interface, or connection, and one direction."""
 
-    __slots__ = ("_chunks", "_end_ns", "_length", "_options", "_quiet_ns", "_splitter")
+    __slots__ = ("_chunks", "_end_ns", "_length", "_options", "_quiet_ns", "_splitter", "_transport")
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, transport: Transport = "uart") -> None:
         self._options = options
+        self._transport = transport
         self._quiet_ns = options.limit_ns(options.quiet)
         self._splitter = Splitter()
         self._chunks: deque[tuple[int, Packet]] = deque()  # (stream offset, packet) that a record may still begin in
@@ -57,19 +60,31 @@ class Stream:
 
     def silent_at(self, time_ns: int, longer_ns: int = 0) -> bool:
         """Tell whether a packet that begins at `time_ns` comes after silence, by `longer_ns` more than needed."""
-        return self._end_ns is not None and time_ns - self._end_ns > self._quiet_ns + longer_ns
+        return (
+            self._transport == "uart"
+            and self._end_ns is not None
+            and time_ns - self._end_ns > self._quiet_ns + longer_ns
+        )
 
     def feed(self, packet: Packet) -> list[Located]:
         """Take the next packet of the stream; return the records that are now certain."""
         out: list[Located] = []
         if not packet.data:
-            self._splitter.event()
+            if self._transport == "uart":
+                self._splitter.event()
+            elif packet.after_gap:
+                out = self.flush()
             return out
-        if self.silent_at(packet.time_ns):
+        if packet.after_gap or self.silent_at(packet.time_ns):
             out = self.flush()
+        if self._transport == "ble" and bluetooth_module.is_text(packet.data) and not self._splitter.begun:
+            self._splitter.event()
+            text = Record(self._length, packet.data, Kind.FOREIGN, foreign=bluetooth_module.NAME)
+            out.append(Located(text, packet, packet.time_ns, packet.time_ns))
+            return out
         self._chunks.append((self._length, packet))
         self._length += len(packet.data)
-        self._end_ns = packet.time_ns + self._options.characters_ns(len(packet.data))
+        self._end_ns = packet.time_ns + self._lasts_ns(len(packet.data))
         records = self._splitter.feed(packet.data)
         if records:
             out += self._locate(records)
@@ -79,9 +94,13 @@ class Stream:
         """Silence or the end: return what is held."""
         return self._locate(self._splitter.flush())
 
+    def _lasts_ns(self, count: int) -> int:
+        """Return how long `count` characters take, in ns."""
+        return self._options.characters_ns(count) if self._transport == "uart" else 0
+
     def _locate(self, records: Iterable[Record]) -> list[Located]:
         chunks = self._chunks
-        time = self._options.characters_ns
+        time = self._lasts_ns
         out: list[Located] = []
         for record in records:
             offset, packet = chunks[0]

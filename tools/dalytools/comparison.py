@@ -30,9 +30,11 @@ from dalytools.field_names import FIELD_NAMES, SETTINGS
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
 from dalytools.wire_times import preferences
+from dalytools.wires import choice as wires
+from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator
     from pathlib import Path
 
     from dalyref.packet import Packet
@@ -50,7 +52,7 @@ _TIME_TOLERANCE_S = 2e-6  # the dissector calculates in floating point from the 
 _MOST_SHOWN = 1000
 _MOST_REST = 1 << 20
 
-Key = tuple[int, str]
+Key = tuple[int | str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,24 +116,26 @@ def compare(
     path: Path,
     *,
     options: Options | None = None,
+    choice: wires.Choice | None = None,
     progress: Callable[[int], None] | None = None,
     listener: Listener | None = None,
 ) -> Comparison:
     """Compare both readings of a capture file.
 
-    options: the constants for both. progress: called now and then with the number of packets compared. listener: is
-    given all packets of the file, then all records of the reference. Raises Problem
-    when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off is compared as
-    far as it goes: ``broken``.
+    options: the constants for both. choice: TCP ports and Bluetooth handles, for both. progress: called now and then
+    with the number of packets compared. listener: is given all packets of the file, then all records of the reference.
+    Raises Problem when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off
+    is compared as far as it goes: ``broken``.
     """
     _refuse_pipes(path)
     result = Comparison()
-    wanted = ",".join(str(number) for number in sorted(_link_types(path, result, listener)))
+    serial = DALY_LINK_TYPES.intersection(_link_types(path, result, listener))
     options = options or Options()
-    arguments = [
-        *preferences(options),
-        "-o",
-        f"daly.link_types:{wanted}",
+    choice = choice or wires.Choice()
+    arguments = [*preferences(options), *wires.preferences(choice)]
+    if serial:
+        arguments += ["-o", f"daly.link_types:{','.join(map(str, sorted(serial)))}"]
+    arguments += [
         "-r",
         str(tshark.readable(path)),
         "-T",
@@ -142,7 +146,7 @@ def compare(
         arguments += ["-e", name]
     # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
     with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
-        _walk(rows, path, _Told(options, listener), result, progress)
+        _walk(rows, _Fed(path, choice, _Told(options, listener)), result, progress)
     told = any(difference.field == _LUA_ERROR for difference in result.differences)
     with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
         for row in rows:
@@ -153,19 +157,27 @@ def compare(
 
 
 def read_alone(
-    path: Path, *, options: Options | None = None, progress: Callable[[int], None] | None = None, listener: Listener
+    path: Path,
+    *,
+    options: Options | None = None,
+    choice: wires.Choice | None = None,
+    progress: Callable[[int], None] | None = None,
+    listener: Listener,
 ) -> Comparison:
     """Read a capture with the reference decoder alone, where there is no tshark. Arguments and errors as `compare`."""
     _refuse_pipes(path)
     result = Comparison()
     _link_types(path, result, listener)
-    decoder = _Told(options or Options(), listener)
+    decoder, carriers = _Told(options or Options(), listener), Carriers(choice)
     for packet in _packets(path):
         if _is_ours(packet):
             result.packets += 1
-            _count(decoder.feed(packet), result)
+            for carrier in carriers.of(packet):
+                _count(decoder.feed(carrier), result)
         if progress and packet.number % 4096 == 0:
             progress(packet.number)
+    for carrier in carriers.finish():
+        _count(decoder.feed(carrier), result)
     _count(decoder.finish(), result)
     return result
 
@@ -261,12 +273,12 @@ def _link_types(path: Path, result: Comparison, listener: Listener | None) -> se
         raise Problem(f"{path}: the capture holds no packet")
     if not ours:
         names = ", ".join(link_type_name(number) for number in sorted(others))
-        raise Problem(f"{path}: its link type is {names}; a Daly bus is captured as 147 (USER0) to 162 (USER15)")
+        raise Problem(f"{path}: its link type is {names}; {NOT_READ}")
     return ours
 
 
 def _is_ours(packet: Packet) -> bool:
-    return packet.link_type in DALY_LINK_TYPES and packet.link_type != TAKEN_LINK_TYPE
+    return Carriers.reads(packet.link_type) and packet.link_type != TAKEN_LINK_TYPE
 
 
 def _packets(path: Path) -> Iterator[Packet]:
@@ -276,64 +288,91 @@ def _packets(path: Path) -> Iterator[Packet]:
         return  # said before, by _link_types
 
 
-def _walk(
-    rows: IO[bytes], path: Path, decoder: Decoder, result: Comparison, progress: Callable[[int], None] | None
-) -> None:
+class _Fed:
+    """The reference's reading of a file, which goes on as far as it is asked to."""
+
+    def __init__(self, path: Path, choice: wires.Choice, decoder: Decoder) -> None:
+        self.ready: deque[Decoded] = deque()
+        self.streams: dict[int, Key] = {}
+        """Of packets with something for the decoder, not yet compared: the stream it went to."""
+        self.expected: deque[int] = deque()
+        """Packets that tshark has to show."""
+        self._packets = _packets(path)
+        self._carriers = Carriers(choice)
+        self._decoder = decoder
+        self._ended = False
+
+    def until(self, number: int) -> None:
+        """Go on until all records of a packet are final."""
+        while not self._ended and not (self.ready and self.ready[-1].number > number):
+            self._next()
+
+    def rest(self) -> None:
+        """Go on to the end."""
+        while not self._ended:
+            self._next()
+
+    def _next(self) -> None:
+        packet = next(self._packets, None)
+        if packet is None:
+            self._ended = True
+            self._feed(self._carriers.finish())
+            self.ready.extend(self._decoder.finish())
+        elif _is_ours(packet):
+            self.expected.append(packet.number)
+            self._feed(self._carriers.of(packet))
+
+    def _feed(self, carriers: Iterable[Packet]) -> None:
+        for carrier in carriers:
+            connection = getattr(carrier, "connection", "")
+            self.streams[carrier.number] = (connection or carrier.interface, carrier.direction)
+            self.ready.extend(self._decoder.feed(carrier))
+
+
+def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[int], None] | None) -> None:
     """Go through both readings together, packet by packet."""
-    ready: deque[Decoded] = deque()
-    packets = _packets(path)
-    streams: dict[int, Key] = {}  # of packets not yet compared
+    ready, expected = fed.ready, fed.expected
     sides: dict[Key, tuple[_Rest, _Rest]] = {}
-    ended = False
     last_seen = 0
-    expected = deque[int]()
     for row in rows:
         values = _values(row)
         number = int(values[0])
-        # Feed the reference until all its records of this packet are final.
-        while not ended and not (ready and ready[-1].number > number):
-            packet = next(packets, None)
-            if packet is None:
-                ready.extend(decoder.finish())
-                ended = True
-                break
-            if _is_ours(packet):
-                streams[packet.number] = (packet.interface, packet.direction)
-                expected.append(packet.number)
-                ready.extend(decoder.feed(packet))
+        fed.until(number)
         mine: list[Decoded] = []
         while ready and ready[0].number <= number:
             mine.append(ready.popleft())
         result.packets += 1
         result.records += len(mine)
-        key = streams.pop(number, None)
         while expected and expected[0] <= number:
             if expected[0] < number:
                 result.add(Difference(expected[0], "packet", "not shown", "present"))
             expected.popleft()
-        if key is not None:
-            _packet(number, values[1:], mine, sides.setdefault(key, (_Rest(), _Rest())), result)
+        key = fed.streams.pop(number, None)
+        rest = (_Rest(), _Rest()) if key is None else sides.setdefault(key, (_Rest(), _Rest()))
+        _packet(number, values[1:], mine, rest, result)
+        if key is None:  # a packet that is not ours has no record in either reading
+            _close(number, rest, result)
         last_seen = number
         if progress and number % 4096 == 0:
             progress(number)
-    while not ended:
-        packet = next(packets, None)
-        if packet is None:
-            ready.extend(decoder.finish())
-            ended = True
-        elif _is_ours(packet):
-            ready.extend(decoder.feed(packet))
+    fed.rest()
     if ready:
         result.add(
             Difference(ready[0].number, "packet", f"nothing after packet {last_seen}", f"{len(ready)} more records")
         )
-    for dissector, reference in sides.values():
-        dissector.close(last_seen)
-        reference.close(last_seen)
-        _compare_rest(dissector, reference, result)
-        if len(dissector.pieces) != len(reference.pieces) and not result.found:  # else its cause is named
-            shown, told = (f"{len(side.pieces)} more stretches of bytes" for side in (dissector, reference))
-            result.add(Difference(last_seen, "bytes before", shown, told))
+    for rest in sides.values():
+        _close(last_seen, rest, result)
+
+
+def _close(number: int, rest: tuple[_Rest, _Rest], result: Comparison) -> None:
+    """Compare what is left of a stream that has ended."""
+    dissector, reference = rest
+    dissector.close(number)
+    reference.close(number)
+    _compare_rest(dissector, reference, result)
+    if len(dissector.pieces) != len(reference.pieces) and not result.found:  # else its cause is named
+        shown, told = (f"{len(side.pieces)} more stretches of bytes" for side in rest)
+        result.add(Difference(number, "bytes before", shown, told))
 
 
 def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Rest, _Rest], result: Comparison) -> None:

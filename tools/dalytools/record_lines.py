@@ -53,7 +53,7 @@ _TROUBLE = {
     "daly.burst.repeat": "the same part again",
     "daly.burst.cut_off": "cut off here",
 }
-_FILLERS = frozenset((bytes(8), b"\xaa" * 8))
+_FILLERS = frozenset((bytes(8), b"\xaa" * 8, b""))
 _MOST_BYTES = 32
 _MOST_COMMENT = 300
 
@@ -94,6 +94,8 @@ def line(record: Decoded) -> Line:
     match record.kind:
         case Kind.FRAME if fields["daly.dialect"] == "a5":
             kind, who, what, values, warnings = _a5(record)
+        case Kind.FRAME if fields["daly.dialect"] == "hkms":
+            kind, who, what, values, warnings = _hkms(record)
         case Kind.FRAME:
             kind = "modbus"
             who = f"Modbus {record.data[0]:02X}"
@@ -132,18 +134,24 @@ def _listed(fields: Fields, name: str) -> list[Value]:
     return value if isinstance(value, list) else [value]
 
 
+def _number(fields: Fields, name: str) -> int:
+    value = fields[name]
+    return value if isinstance(value, int) else -1
+
+
 def _words(fields: Fields, name: str) -> str:
     return " ".join(str(value) for value in _listed(fields, name))
 
 
 def _a5(record: Decoded) -> tuple[str, str, str, str, str]:
-    fields, data = record.fields, record.data
-    data_id, content = data[2], data[4:12]
+    fields = record.fields
+    data_id, content = _number(fields, "daly.data_id"), bytes.fromhex(str(fields.get("daly.data", "")))
+    address = _number(fields, "daly.can.source" if record.transport == "can" else "daly.address")
     what = f"{data_id:02X} {NAMES.get(data_id, '')}".rstrip()
     board = fields.get("daly.board")
     warnings: list[str] = []
     if fields["daly.direction"] != 2:
-        who = f"host {data[1]:02X}" + (f" > board {board}" if board else "")
+        who = f"host {address:02X}" + (f" > board {board}" if board else "")
         values = "" if content in _FILLERS and "daly.write" not in fields else _hex(content)
         if fields["daly.direction"] == 3:
             return "echo", who, what, values, "echo: the battery sleeps, or the adapter hears itself"
@@ -155,9 +163,11 @@ def _a5(record: Decoded) -> tuple[str, str, str, str, str]:
             warnings.append("no reply")
         asked = f"WRITE {what}" if "daly.write" in fields else f"{what}?"
         return "request", who, asked, values, ", ".join(warnings)
-    who = f"board {board}" if board else f"address {data[1]:02X}"
+    who = f"board {board}" if board else f"address {address:02X}"
     told = _VALUES.get(data_id)
-    if told:
+    if len(content) < 8:  # on CAN
+        values, warnings = _hex(content), ["not eight bytes: no values"]
+    elif told:
         values = told(fields)
     elif data_id in texts.FIELDS:
         whole = fields.get(texts.FIELDS[data_id])
@@ -184,6 +194,48 @@ def _a5(record: Decoded) -> tuple[str, str, str, str, str]:
     if cleared := _words(fields, "daly.fault_cleared"):
         warnings.append(f"went: {cleared}")
     return "reply", who, what, values, ", ".join(warnings)
+
+
+_HKMS_NAMES = {
+    0x0400: "cells",
+    0x0401: "temperatures",
+    0x0402: "pack",
+    0x0403: "power",
+    0x0404: "cell extremes",
+    0x0405: "temp. extremes",
+    0x0406: "MOS",
+    0x0407: "state",
+    0x0408: "counts",
+    0x040A: "balance",
+    0x040E: "faults",
+    0x182A: "charge MOS",
+    0x182C: "discharge MOS",
+    0x161E: "SOC",
+    0x181E: "SOC",
+}
+_HKMS_OWN = ("daly.can.", "daly.kind", "daly.transport", "daly.dialect", "daly.direction", "daly.board", "daly.data")
+"""Fields that a line tells otherwise, or leaves out."""
+
+
+def _hkms(record: Decoded) -> tuple[str, str, str, str, str]:
+    """Say what a frame of the HKMS dialect is: its values by their names, faults only those that are there."""
+    fields = record.fields
+    number, source = _number(fields, "daly.can.register"), _number(fields, "daly.can.source")
+    board = fields.get("daly.board")
+    name = f"{number:04X} {_HKMS_NAMES.get(number, '')}".rstrip()
+    shown = [
+        f"{name.removeprefix('daly.')} {_words(fields, name)}"
+        for name, value in fields.items()
+        if not name.startswith((*_HKMS_OWN, "daly.cell.0", "daly.cell.1", "daly.cell.2", "daly.cell.3", "daly.cell.4"))
+        and name not in ("daly.reserved", "daly.write")
+        and not (name.startswith(("daly.fault.", "daly.level.")) and not value)
+    ]
+    values = "  ".join(shown) or _hex(record.data)
+    if fields["daly.direction"] == 1:
+        who = f"host {source:02X}" + (f" > board {board}" if board else "")
+        what = f"WRITE {name}" if "daly.write" in fields else "keep-alive"
+        return "request", who, what, values if "daly.write" in fields else "", ""
+    return "reply", f"board {board}", name, values, ""
 
 
 def _pack(fields: Fields) -> str:

@@ -69,18 +69,18 @@ class Summary:
         direction = fields.get("daly.direction")
         if direction is None:
             self._modbus += record.kind is Kind.FRAME
-        elif direction == REPLY:
+        elif direction == REPLY and "daly.data_id" in fields:
             self._reply(fields)
         elif direction == ECHO:
             self._echoes += 1
-        else:
-            key = (_number(fields, "daly.address"), _number(fields, "daly.data_id"))
+        elif "daly.data_id" in fields:
+            key = (_number(fields, _asked_name(fields)), _number(fields, "daly.data_id"))
             self._asked[key] += 1
             self._unanswered[key] += "daly.reply_in" not in fields
             self._retries += "daly.retry" in fields
 
     def _reply(self, fields: Fields) -> None:
-        board = self._boards.setdefault(_number(fields, "daly.address"), _BoardSeen())
+        board = self._boards.setdefault(_number(fields, _speaker_name(fields)), _BoardSeen())
         board.ids[_number(fields, "daly.data_id")] += 1
         wait = fields.get("daly.response_time")
         if isinstance(wait, float):
@@ -150,6 +150,14 @@ def _board_lines(address: int, board: _BoardSeen) -> list[str]:
 
 def _kind_name(kind: str) -> str:
     return {"frame": "good", "bad_checksum": "bad checksum", "short": "cut off"}.get(kind, kind)
+
+
+def _speaker_name(fields: Fields) -> str:
+    return "daly.can.source" if "daly.can.source" in fields else "daly.address"
+
+
+def _asked_name(fields: Fields) -> str:
+    return "daly.can.destination" if "daly.can.source" in fields else "daly.address"
 
 
 def _number(fields: Fields, name: str) -> int:

@@ -365,7 +365,7 @@ def test_a_tshark_that_dies_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("link_type", "says"),
     [
-        (1, "its link type is 1 (Ethernet); a Daly bus is captured as 147 (USER0) to 162 (USER15)"),
+        (105, "its link type is 105 (IEEE 802.11); a Daly bus is captured as 147 (USER0) to 162 (USER15), SocketCAN, "),
         (149, "its link type is 149 (USER2)"),
     ],
 )

@@ -28,6 +28,7 @@ from dalytools.progress import progress_bar
 from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Settings can stand in dalyshark.toml, in the working directory or beside the first capture (docs/ci.md). "
         "Exit status: 0 nothing at or above --fail-on, 1 something, 2 could not run."
     )
-    parser.add_argument("files", nargs="*", metavar="FILE", help="capture file (pcapng or pcap)")
+    parser.add_argument("files", nargs="*", metavar="FILE", help="capture file, or a log of candump -L")
     parser.add_argument("-q", "--quiet", action="store_true", help="only what makes the check fail, and the sum")
     parser.add_argument("--rules", action="store_true", help="list the rules with what each means, and end")
     which = parser.add_mutually_exclusive_group()
@@ -86,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--github", action="store_true", help="findings as annotations of GitHub Actions")
     parser.add_argument("--no-colour", "--no-color", action="store_true", help="as NO_COLOR=1 does")
     wire_times.add_arguments(parser, quiet="--silence")
+    choice.add_arguments(parser)
 
 
 def _limit(text: str) -> float:
@@ -103,6 +105,7 @@ class _Asked:
     """What to check by: command line over configuration over defaults."""
 
     options: Options
+    choice: choice.Choice
     limits: Limits
     severity: dict[str, Severity]
     ignored: frozenset[str]
@@ -119,6 +122,7 @@ class _Asked:
         fail_on: str = args.fail_on or settings.fail_on or str(Severity.ERROR)
         return cls(
             wire_times.read(args, base),
+            choice.read(args),
             limits,
             settings.severity,
             frozenset((*settings.ignore, *args.ignore)),
@@ -198,10 +202,19 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
     try:
         with progress_bar(f"check {plain(Path(name).name)}") as advance:
             if tshark is None:
-                result = read_alone(Path(name), options=asked.options, progress=advance, listener=search)
+                result = read_alone(
+                    Path(name), options=asked.options, choice=asked.choice, progress=advance, listener=search
+                )
             else:
                 listener = search if asked.rules else None
-                result = compare(tshark, Path(name), options=asked.options, progress=advance, listener=listener)
+                result = compare(
+                    tshark,
+                    Path(name),
+                    options=asked.options,
+                    choice=asked.choice,
+                    progress=advance,
+                    listener=listener,
+                )
                 checked.differences = result.found
     except Problem as problem:
         checked.problem = str(problem)

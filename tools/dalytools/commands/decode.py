@@ -14,13 +14,14 @@ from dalycapture.errors import CaptureError
 from dalycapture.linktype import link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
-from dalyref.packet import SERIAL_LINK_TYPES
 from dalytools import wire_times
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.record_lines import line
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
+from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
     import argparse
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = "Show what the reference decoder reads in capture files."
     parser.epilog = "Exit status: 0 all read, 2 a file could not be read, or not to its end (what was read is shown)."
     parser.add_argument(
-        "files", nargs="+", metavar="FILE", help="capture file (pcapng or pcap), or - for standard input"
+        "files", nargs="+", metavar="FILE", help="capture file, a log of candump -L, or - for standard input"
     )
     parser.add_argument(
         "--format",
@@ -54,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
     wire_times.add_arguments(parser)
+    choice.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -61,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     files: list[str] = args.files
     output: str = args.output
     options = wire_times.read(args)
+    chosen = choice.read(args)
     if output != "-":
         for name in files:
             if name != "-" and os.path.realpath(name) == os.path.realpath(output):
@@ -71,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
         shown = 0
         for name in files:
             said = len(problems)
-            shown += _decode_file(name, options, put, problems)
+            shown += _decode_file(name, options, chosen, put, problems)
             out.flush()
             for problem in problems[said:]:
                 print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
@@ -80,9 +83,16 @@ def run(args: argparse.Namespace) -> int:
     return 2 if problems else 0
 
 
-def _decode_file(name: str, options: Options, put: Callable[[str, Decoded], None], problems: list[str]) -> int:
+def _decode_file(
+    name: str,
+    options: Options,
+    chosen: choice.Choice,
+    put: Callable[[str, Decoded], None],
+    problems: list[str],
+) -> int:
     """Put every record of one file out; return how many, and append what is wrong with the file to `problems`."""
     decoder = Decoder(options)
+    carriers = Carriers(chosen)
     shown = 0
     others: set[int] = set()
     packets = passed = 0
@@ -93,14 +103,17 @@ def _decode_file(name: str, options: Options, put: Callable[[str, Decoded], None
             try:
                 for packet in read_capture(name):
                     packets += 1
-                    if packet.link_type not in SERIAL_LINK_TYPES:
+                    if not carriers.reads(packet.link_type):
                         others.add(packet.link_type)
                         passed += 1
-                    yield decoder.feed(packet)
+                    for carrier in carriers.of(packet):
+                        yield decoder.feed(carrier)
                     if packets % 1024 == 0:
                         advance(packets)
             except CaptureError as error:
                 problems.append(str(error))
+            for carrier in carriers.finish():
+                yield decoder.feed(carrier)
             yield decoder.finish()
 
         for batch in batches():
@@ -110,7 +123,7 @@ def _decode_file(name: str, options: Options, put: Callable[[str, Decoded], None
     if others:
         names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
         if passed == packets:
-            problems.append(f"{name}: its link type is {names}; a Daly bus is captured as 147 (USER0) to 162 (USER15)")
+            problems.append(f"{name}: its link type is {names}; {NOT_READ}")
         else:
             print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
     elif not packets and not problems:
