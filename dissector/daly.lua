@@ -5,7 +5,7 @@
 --
 --   A5 frame    A5 | address | data ID | 08 | d0 d1 d2 d3 d4 d5 d6 d7 | sum          paper Daly UART/485 V1.2
 --
---   packets --daly_serial, daly_tcp--> records --daly_bus--> their meaning --daly_view--> tree, columns
+--   packets --daly_serial, daly_tcp, daly_can--> records --daly_bus--> their meaning --daly_view--> tree, columns
 --
 -- Runs in Lua 5.2 (Wireshark 4.0, 4.2) to 5.4 (4.4, 4.6).
 
@@ -29,6 +29,7 @@ local windows = require("daly_windows")
 local view = require("daly_view")
 local serial = require("daly_serial")
 local tcp = require("daly_tcp")
+local can = require("daly_can")
 require("daly_stat").register()
 require("daly_hexlog").register()
 
@@ -58,6 +59,11 @@ prefs.heuristic = Pref.bool(
   "Look for Daly frames in any TCP connection",
   false,
   "Take a TCP connection for a bus when it begins with a Daly frame, whatever its port"
+)
+prefs.can = Pref.bool(
+  "Look for Daly frames on CAN",
+  true,
+  "Take CAN frames with Daly's identifiers for Daly's; off: only where you choose Daly for CAN (Decode As)"
 )
 prefs.modbus = Pref.bool(
   "Recognise Modbus frames",
@@ -106,6 +112,7 @@ local function begin()
   view.init(options)
   serial.init(options)
   tcp.init(options)
+  can.init(options, prefs.can)
 end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
@@ -116,6 +123,8 @@ function daly.dissector(buffer, pinfo, parent)
   handle = handle or Dissector.get("daly")
   if pinfo.port_type ~= NO_PORTS then
     return tcp.dissect(buffer, pinfo, parent, handle)
+  elseif can.brought(buffer, pinfo.match_uint) then
+    return can.dissect(buffer, pinfo, parent, handle)
   end
   return serial.dissect(buffer, pinfo, parent, handle)
 end
@@ -189,6 +198,7 @@ function daly.init()
 end
 
 claim()
+can.setup(daly)
 tcp_ports:add_for_decode_as(daly)
 DissectorTable.get("rtacser.data"):add_for_decode_as(daly)
 

@@ -74,9 +74,8 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
       end
     end
   elseif byte(raw, 4) ~= 8 then -- on CAN: it answers, and says nothing
-    link[slot], wait[slot], memory[slot] = false, false, false
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
-    link[slot], wait[slot] = request or false, waited or false
+    link[slot], wait[slot], memory[slot] = request or false, waited or false, false
   elseif BURST_IDS[id] then
     link[slot], wait[slot], memory[slot] = false, false, false
     local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends)

@@ -595,7 +595,7 @@ end
 function M.complaints(id, frame)
   local list = {}
   if id == 0x98 then
-    if frame.memory then
+    if frame.memory and frame.memory ~= frame.raw:sub(5, 12) then
       local raised, cleared = faults.changes(frame.memory, 1, frame.raw, 5)
       if #raised > 0 then
         list[1] = { "raised", "Raised: " .. concat(raised, ", ") }

@@ -35,6 +35,7 @@ function M.new()
     whole_in = {},
     odd = {},
     buses = {}, -- all of the capture
+    can = false, -- it is of CAN: frames are in the form that daly_bus tells
     latest = -math.huge, -- when the latest packet of the capture began, s
   }
 end

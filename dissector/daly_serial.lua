@@ -7,6 +7,7 @@
 
 local streams = require("daly_streams")
 local records = require("daly_records")
+local second_look = require("daly_second_look")
 local view = require("daly_view")
 
 local M = {}
@@ -20,12 +21,8 @@ local interfaces -- by number: what is known of each
 local handed -- packets that were given to the user's own DLT_USER setting, by number
 local read_to -- number of the newest packet that was read
 
--- In the first of two passes (tshark -2, the GUI's loading, sharkd) Wireshark makes no tree unless a filter needs one,
--- and without a tree nobody can tell a packet's interface. All is then taken for one interface. A second look knows
--- better: if there are several, it reads the packets again, in order, as a single pass would. (tshark -2 -Y frame knows
--- at once.) nil, or { capture =, interfaces =, after = the next packet's number by number, newest =: the last of those,
--- last =: number of the last packet read again, one_way =: RTAC's directions could not be told, only =: the line,
--- several =: it is not the only one }.
+-- Packets whose interface could not be told (daly_second_look), nil: none. With one_way: RTAC's directions could not be
+-- told either; interfaces: as found at the second look.
 local blind
 
 -- DLT_USER, which served our link types before, by wtap number; and those that the user has set nothing for.
@@ -94,24 +91,19 @@ local function stream_of(from, interface, direction)
   return stream
 end
 
+local function read_again(state, interface, direction, number, pinfo, raw)
+  streams.first(state, stream_of(state, interface, direction), number, pinfo.rel_ts, raw)
+end
+
 -- What to show a packet from that was read without its interface: the capture, and whether its end is known.
 -- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
-local function second_look(number, pinfo, raw)
+local function look_again(number, pinfo, raw)
   local interface, direction = interface_of(blind.interfaces), direction_of(pinfo)
   -- A direction that was known in the first pass too divides nothing that was not divided then.
   local line = interface.key * 4 + (blind.one_way and direction or -1)
-  blind.only = blind.only or line
-  blind.several = blind.several or line ~= blind.only
-  if number == blind.after[blind.last] then
-    streams.first(blind.capture, stream_of(blind.capture, interface, direction), number, pinfo.rel_ts, raw)
-    blind.last = number
-  end
-  if not blind.several then
-    return capture, true
-  elseif number <= blind.last then
-    return blind.capture, false
-  end
-  return nil, true
+  local from, anew =
+    second_look.look(blind, capture, number, line, false, read_again, interface, direction, number, pinfo, raw)
+  return from, not anew
 end
 
 -- Whether any of these items is a frame, or a part of one.
@@ -154,9 +146,9 @@ function M.dissect(buffer, pinfo, parent, handle)
     local direction, unseen = direction_of(pinfo)
     whole = streams.first(capture, stream_of(capture, interface, direction), number, pinfo.rel_ts, raw)
     if interface.key == -1 then
-      blind = blind or { capture = streams.capture(options), interfaces = {}, after = {}, last = 0, newest = 0 }
-      blind.after[blind.newest] = number
-      blind.newest = number
+      blind = blind or second_look.new(streams.capture(options))
+      blind.interfaces = blind.interfaces or {}
+      second_look.note(blind, number)
       blind.one_way = blind.one_way or unseen
     end
     if not interface.ours then
@@ -168,7 +160,7 @@ function M.dissect(buffer, pinfo, parent, handle)
     end
   else
     if blind then
-      from, again = second_look(number, pinfo, raw)
+      from, again = look_again(number, pinfo, raw)
     end
     whole = from and from.plans[number] == nil and length == 13 and raw:byte() == 0xA5
   end

@@ -44,18 +44,22 @@ end
 
 --- Count one record.
 function Report:record(pinfo, kind, raw, slot, _, results)
-  self.records, self.bytes = self.records + 1, self.bytes + #raw
+  local whole = kind == "frame" and #raw == 13 and byte(raw) == 0xA5
+  -- A frame of CAN comes in the form of an A5 frame (daly_bus).
+  local on_can = results.can and whole
+  self.records, self.bytes = self.records + 1, self.bytes + (on_can and byte(raw, 4) or #raw)
   self.kinds[kind] = (self.kinds[kind] or 0) + 1
   self.first = self.first or pinfo.rel_ts
   self.last = pinfo.rel_ts
-  if kind ~= "bad_checksum" and not (kind == "frame" and byte(raw) == 0xA5) then
+  if kind ~= "bad_checksum" and not whole then
     return
   end
   local address, id = byte(raw, 2, 3)
   if kind == "frame" and not DATA_IDS[id] then
     self.unknown[id] = (self.unknown[id] or 0) + 1
   end
-  local row = row_of(self, addresses.board(address), id)
+  local asked = on_can and address >= 0x20 and byte(raw, 13)
+  local row = row_of(self, asked or addresses.board(address), id)
   if kind == "bad_checksum" then
     row.damaged = row.damaged + 1
   elseif address < 0x20 then

@@ -148,6 +148,12 @@ local function id_words(id)
   return format("0x%02X %s", id, data_ids[id] or "unknown ID")
 end
 
+-- The beginning of a reply's words.
+local function reply_words(board, id)
+  local who = board and format("board %d", board) or "unknown board"
+  return format("Reply %s  %s%s", who, id_words(id), payload.words[id] and ": " or "  ")
+end
+
 -- The constant part of a frame's words, by address * 256 + ID.
 local beginnings, sources, destinations = {}, {}, {}
 
@@ -155,11 +161,10 @@ local function names_of(address, id)
   local key = address * 256 + id
   if not beginnings[key] then
     local board = board_of(address)
-    local who = board and format("board %d", board) or (address >= 0x20 and "any board" or "unknown board")
     if address >= 0x20 then
-      beginnings[key] = format("Request %s  %s", who, id_words(id))
+      beginnings[key] = format("Request %s  %s", board and format("board %d", board) or "any board", id_words(id))
     else
-      beginnings[key] = format("Reply %s  %s%s", who, id_words(id), payload.words[id] and ": " or "  ")
+      beginnings[key] = reply_words(board, id)
     end
     local host = address >= 0x20 and host_name(address) or "Host"
     local other = board and format("Board %d", board)
@@ -581,7 +586,7 @@ function M.a5_on(item, raw, slot, by)
   return text, source, destination
 end
 
-M.out, M.id_words, M.host_name = out, id_words, host_name
+M.out, M.hex_words, M.id_words, M.host_name, M.reply_words = out, hex_words, id_words, host_name, reply_words
 
 --- A packet that is one whole A5 frame, which is the usual one.
 function M.whole(parent, buffer, raw, slot, pinfo)

@@ -188,18 +188,20 @@ def _count(records: list[Decoded], result: Comparison) -> None:
         result.kinds[record.kind] = result.kinds.get(record.kind, 0) + 1
 
 
-class _Told(Decoder):
+class _Told:
     """The reference decoder, its records told to a listener too."""
 
     def __init__(self, options: Options, listener: Listener | None) -> None:
-        super().__init__(options)
+        self._decoder = Decoder(options)
         self._listener = listener
 
     def feed(self, packet: Packet) -> list[Decoded]:
-        return self._tell(super().feed(packet))
+        """Take the next packet; return the records that are final."""
+        return self._tell(self._decoder.feed(packet))
 
     def finish(self) -> list[Decoded]:
-        return self._tell(super().finish())
+        """Take the end of the file; return all that was held."""
+        return self._tell(self._decoder.finish())
 
     def _tell(self, records: list[Decoded]) -> list[Decoded]:
         if self._listener is not None:
@@ -291,7 +293,7 @@ def _packets(path: Path) -> Iterator[Packet]:
 class _Fed:
     """The reference's reading of a file, which goes on as far as it is asked to."""
 
-    def __init__(self, path: Path, choice: wires.Choice, decoder: Decoder) -> None:
+    def __init__(self, path: Path, choice: wires.Choice, decoder: _Told) -> None:
         self.ready: deque[Decoded] = deque()
         self.streams: dict[int, Key] = {}
         """Of packets with something for the decoder, not yet compared: the stream it went to."""

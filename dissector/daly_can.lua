@@ -1,0 +1,249 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- CAN frames: SocketCAN captures, candump logs, and whatever else Wireshark shows as CAN (docs/wires.md 2).
+--
+-- Lua sees a frame's identifier in fields alone, which are not always there (daly_second_look). But a dissector that is
+-- registered for an identifier finds it in pinfo.match_uint. So we register for all that can be ours, and nothing of
+-- ours runs for other frames. Identifiers that tell Daly from others are registered from the start; the others, some
+-- 200,000, once one of those was seen or the user chose us (Decode As).
+--
+--   frame --identifier--> us? --daly_can_bus--> what it is --view--> tree, columns
+
+local can_bus = require("daly_can_bus")
+local classic = require("daly_can_classic")
+local hkms = require("daly_hkms")
+local ids = require("daly_can_ids")
+local second_look = require("daly_second_look")
+local view = require("daly_view")
+local fields = require("daly_fields").fields
+
+local M = {}
+
+-- Called by its name, a method of Wireshark's objects is looked up in C every time.
+local bytes_of, place_of, length_of = Tvb.raw, Tvb.offset, Tvb.reported_len
+local out = view.out
+
+-- State of the capture that is open.
+local options
+local state -- as read in order, once
+local read_to -- number of the newest packet that was read
+local blind -- frames whose interface could not be told (daly_second_look), nil: none
+local usual -- where the frame lies in its packet
+local others -- slots of frames that lie elsewhere, by number and place
+local slots -- given to those, counted down from -1
+local searching -- the preference
+local no_interfaces -- the file does not tell any
+local chosen -- the user chose us for CAN, as far as was seen
+local refused_number, refused_id -- the newest frame that was not taken for ours
+
+local interface_id = Field.new("frame.interface_id")
+local can_id = Field.new("can.id")
+local is_extended = Field.new("can.flags.xtd")
+local is_remote = Field.new("can.flags.rtr")
+
+local extended_ids, standard_ids = DissectorTable.get("can.extended_id"), DissectorTable.get("can.id")
+local next_level = DissectorTable.get("can.subdissector")
+local CHOSEN = 0 -- pinfo.match_uint when the user's choice brings us a frame
+local daly
+local all_registered = false
+
+--- Once: the protocol, for which identifiers are registered.
+function M.setup(proto)
+  daly = proto
+  extended_ids:add(ids.sure_ranges(), daly)
+  next_level:add_for_decode_as(daly)
+end
+
+local function register_all()
+  if not all_registered then
+    local extended, standard = ids.other_ranges()
+    extended_ids:add(extended, daly)
+    standard_ids:add(standard, daly)
+    all_registered = true
+  end
+end
+
+--- Begin a capture. `with`: see daly_streams.capture; `search`: look for Daly's identifiers.
+function M.init(with, search)
+  options, searching = with, search
+  chosen, no_interfaces, refused_number, refused_id = false, false, nil, nil
+  state = can_bus.capture(options, chosen)
+  read_to, blind, usual, others, slots = 0, nil, nil, {}, 0
+end
+
+-- A frame's slot, and whether it is seen for the first time. The slot is the packet's number; some carriers put several
+-- frames into one packet, which are told apart by their place.
+local function slot_of(buffer, number)
+  local place = place_of(buffer)
+  usual = usual or place
+  if place == usual then
+    local first = number > read_to
+    read_to = first and number or read_to
+    return number, first
+  end
+  local key = number .. ":" .. place
+  local slot = others[key]
+  if slot then
+    return slot, false
+  end
+  slots = slots - 1
+  others[key] = slots
+  return slots, true
+end
+
+local NO_INTERFACE = -1 -- where it is not told, or there is none
+
+-- Number of the interface of the frame at hand. `tree`: whether there is one, which would tell it.
+local function interface_key(tree)
+  if no_interfaces then
+    return NO_INTERFACE
+  end
+  local id = interface_id()
+  no_interfaces = tree and not id -- a classic pcap
+  return id and id.value or NO_INTERFACE
+end
+
+-- The frame at hand, for view.one.
+local frame = {}
+
+local function show_foreign(_, thing, wanted)
+  local shape, length = thing.shape, thing.length
+  if wanted then
+    if shape.priority then
+      classic.show_head(shape, 0, thing.remote)
+    end
+    out.made(fields.foreign, thing.name)
+    if length > 0 then
+      out.bytes(fields.undecoded, 0, length)
+    end
+  end
+  return "Not Daly: " .. thing.name
+end
+
+-- Show what was found out of a frame, if it is ours. Returns how many bytes were taken.
+local function show(from, slot, id, data, remote, buffer, pinfo, parent, handle, again)
+  local found = from.found[slot]
+  local is_classic = not found and from.results.link[slot] ~= nil
+  if not found and not is_classic then
+    return 0
+  end
+  local length = #data
+  view.look(parent, handle, from.results, again, "can")
+  frame.shape, frame.slot, frame.remote, frame.length = ids.shape(id), slot, remote, length
+  if is_classic then
+    frame.raw = classic.raw(frame.shape, data)
+    view.one(parent, buffer, length, "frame", frame.raw, slot, pinfo, classic.show, frame)
+  elseif found == can_bus.HKMS then
+    frame.raw = data
+    view.one(parent, buffer, length, "frame", hkms.counted(frame), slot, pinfo, hkms.show, frame)
+  else
+    frame.name = found
+    view.one(parent, buffer, length, "foreign", data, slot, pinfo, show_foreign, frame)
+  end
+  return length > 0 and length or 1 -- 0 would say that it is not ours
+end
+
+local LOWEST = 0x351 -- of the identifiers; above all of wtap_encap's numbers
+local RTAC_HEADER = 12
+
+--- Whether what brought us a packet is CAN, by pinfo.match_uint: an identifier; or the user's choice, which can be of
+-- RTAC serial too.
+function M.brought(buffer, key)
+  return key >= LOWEST or key == CHOSEN and buffer:offset() ~= RTAC_HEADER
+end
+
+local function refuse(number, id)
+  refused_number, refused_id = number, id
+  return 0
+end
+
+-- The identifier of a frame that the user's choice brought; nil where it is none of ours, or can't be told.
+local function chosen_id(number)
+  if refused_number == number then
+    return refused_id
+  end
+  local id, extended = can_id(), is_extended()
+  if id and extended and extended.value == (id.value >= ids.STANDARD) then
+    return id.value
+  end
+  return nil
+end
+
+-- The frame that shows that the user chose us: from now on all that can be ours is registered.
+local function choose()
+  chosen = true
+  can_bus.choose(state)
+  if blind then
+    can_bus.choose(blind.state)
+  end
+  register_all()
+end
+
+local function note_blind(number)
+  blind = blind or second_look.new(can_bus.capture(options, chosen))
+  second_look.note(blind, number)
+end
+
+--- Dissect a CAN frame. `handle`: our protocol's dissector. Returns how many bytes were taken, 0: it is not ours.
+function M.dissect(buffer, pinfo, parent, handle)
+  local id, number = pinfo.match_uint, pinfo.number
+  local slot, first = slot_of(buffer, number)
+  if id == CHOSEN then
+    if chosen then
+      return 0 -- its identifier brought it here before
+    end
+    choose()
+    first, id = true, chosen_id(number)
+    if not id then
+      if not can_id() then
+        note_blind(number)
+        blind.several = true -- it may be ours, and a second look knows
+      end
+      return 0
+    end
+  elseif not (searching or chosen) then
+    return refuse(number, id)
+  end
+  local data = bytes_of(buffer)
+  local length = #data
+  if length ~= 8 and (length > 8 or length ~= length_of(buffer)) then
+    return 0
+  end
+  local from, whole = state, true
+  -- Every frame but those of CAN FD has this flag, where there is a tree.
+  local flag = is_remote()
+  local remote = flag and flag.value
+  local seen = flag or can_id()
+  -- Without a tree it was taken for a data frame.
+  local not_ours = seen and not flag or remote and id < ids.STANDARD
+  local surprise = not_ours or remote and length > 0
+  if remote then
+    data = ""
+  end
+  if first and not pinfo.visited then
+    if not_ours then
+      return 0
+    end
+    can_bus.read(state, interface_key(seen), slot, number, id, data, pinfo.rel_ts)
+    if not seen then
+      note_blind(number)
+    end
+    if not all_registered and state.known then
+      register_all()
+    end
+    whole = false
+  elseif blind and seen then
+    local key = interface_key(seen)
+    local read = not_ours and can_bus.pass or can_bus.read
+    local anew
+    from, anew = second_look.look(blind, state, number, key, surprise, read, key, slot, number, id, data, pinfo.rel_ts)
+    if not from then
+      return 0
+    end
+    whole = not anew
+  end
+  local taken = show(from, slot, id, data, remote, buffer, pinfo, parent, handle, whole)
+  return taken > 0 and taken or refuse(number, id)
+end
+
+return M

@@ -1,0 +1,111 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- Frames of CAN in the order of the capture: which are ours, and what they mean to each other (docs/wires.md 2).
+-- A bus is an interface.
+--
+--   identifier --daly_can_ids--> shape --what was seen on this bus--> classic: daly_bus
+--                                                                     HKMS: daly_hkms_bus
+--                                                                     foreign, by name
+--                                                                     not ours
+
+local bus_module = require("daly_bus")
+local results_module = require("daly_results")
+local ids = require("daly_can_ids")
+local classic = require("daly_can_classic")
+local hkms_bus = require("daly_hkms_bus")
+
+local M = {}
+
+local AMBIGUOUS = "HKMS or Deye"
+local NOTHING = ("\0"):rep(8)
+
+--- In found: a frame of HKMS.
+M.HKMS = true
+
+--- Everything known of one capture. `options`: see daly_streams.capture; `chosen`: the user said that it is Daly's.
+function M.capture(options, chosen)
+  local results = results_module.new()
+  results.can = true
+  return {
+    options = options,
+    chosen = chosen,
+    results = results, -- by slot
+    found = {}, -- by slot: M.HKMS, or a foreign frame's name; nil: classic where results has a link, else not ours
+    buses = {}, -- by interface
+    known = chosen, -- Daly was seen
+  }
+end
+
+--- The user said that it is Daly's.
+function M.choose(state)
+  state.chosen, state.known = true, true
+  for _, bus in pairs(state.buses) do
+    bus.classic = true
+  end
+end
+
+local function bus_of(state, key)
+  local bus = state.buses[key]
+  if not bus then
+    local options, results = state.options, state.results
+    local daly = bus_module.new(options, results)
+    daly.can = true
+    bus = {
+      daly = daly,
+      classic = state.chosen, -- a frame that tells Daly from others was seen
+      alive = false, -- a keep-alive was seen
+      hkms = hkms_bus.new(options, results),
+    }
+    state.buses[key] = bus
+  end
+  return bus
+end
+
+-- What a frame is on this bus: "classic", "hkms", a foreign name, or nil.
+local function kind_of(bus, shape, data)
+  if shape.writes and (bus.alive or shape.register == ids.SET_SOC and bus.classic) then
+    return "hkms"
+  elseif shape.classic and (shape.sure or bus.classic) then
+    bus.classic = bus.classic or shape.sure
+    return "classic"
+  elseif shape.keep_alive then
+    if data == NOTHING then
+      bus.alive = true
+      return "hkms"
+    end
+    return nil
+  elseif shape.streamed then
+    return bus.alive and "hkms" or bus.classic and AMBIGUOUS or nil
+  elseif shape.foreign and (bus.classic or bus.alive) then
+    return shape.foreign
+  end
+  return nil
+end
+
+--- One frame, in the order of the capture, once: `id`, `data` (at most eight bytes), `time` in s.
+function M.read(state, key, slot, number, id, data, time)
+  local results = state.results
+  local bus = bus_of(state, key)
+  local shape = ids.shape(id)
+  local kind = kind_of(bus, shape, data)
+  if not kind then
+    return
+  end
+  state.known = true
+  if time > results.latest then
+    results.latest = time
+  end
+  if kind == "classic" then
+    bus_module.feed(bus.daly, slot, number, classic.raw(shape, data), time, time, nil, bus)
+  elseif kind == "hkms" then
+    state.found[slot] = M.HKMS
+    hkms_bus.feed(bus.hkms, slot, number, shape, data, time)
+  else
+    state.found[slot] = kind
+  end
+end
+
+--- A frame that is not read: CAN FD, and remote standard frames.
+function M.pass() end
+
+return M
