@@ -25,6 +25,7 @@ COMMANDS = {
     "capture": "sniff a bus to a file or a pipe",
     "decode": "show what the reference decoder reads in a capture",
     "check": "hold the Wireshark dissector against the reference decoder",
+    "report": "a page with plots and tables, in one file that opens offline",
     "reframe": "cut an old capture, or a raw log, into records again",
     "import": "a log of another tool becomes a capture",
     "install": "dissector, profile and capture tool into Wireshark's personal folders",

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The page as a browser shows it: plots are drawn, nothing is fetched, text of a capture stays text."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
+from dalytools.cli import main
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[4]
+SAMPLES = ROOT / "pcap_samples"
+EVIL = "</script><script>document.title='taken'</script><img src=x onerror=\"document.title='taken'\">\x1b[2J"
+
+
+def browse(page: Path, folder: Path, *, width: int = 1280) -> str:
+    """Open a page in a browser, let it run; return the document that it then has."""
+    words = [
+        "chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+        "--disable-background-networking", "--disable-component-update", "--disable-sync",
+        f"--user-data-dir={folder / 'browser'}", f"--window-size={width},1600", "--virtual-time-budget=10000",
+        "--dump-dom", page.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout
+
+
+def figures(page: Path) -> list[dict[str, list[dict[str, Any]]]]:
+    """Return the figures in a page."""
+    found = re.search(
+        r'<script type="application/json" id="figures">(.*?)</script>', page.read_text("utf-8"), re.DOTALL
+    )
+    assert found
+    return json.loads(found[1])
+
+
+@pytest.fixture(scope="module")
+def faults(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    page = tmp_path_factory.mktemp("report") / "faults.html"
+    assert (
+        main(["report", str(SAMPLES / "made-faults.pcapng"), str(SAMPLES / "made-poll-cycle.pcapng"), "-o", str(page)])
+        == 0
+    )
+    return page
+
+
+def traces(page: Path, name: str) -> Iterator[dict[str, Any]]:
+    for figure in figures(page):
+        yield from (trace for trace in figure["data"] if trace["name"] == name)
+
+
+def test_a_browser_draws_every_figure(faults: Path, tmp_path: Path) -> None:
+    document = browse(faults, tmp_path)
+    assert 'data-ready="2"' in document  # the bus and one board
+    assert document.count("main-svg") >= 2
+    assert "cell_volt_high_level_1" in document
+
+
+def test_a_phone_draws_it_too(faults: Path, tmp_path: Path) -> None:
+    document = browse(faults, tmp_path, width=390)
+    widths = [int(width) for width in re.findall(r'class="main-svg"[^>]*width="(\d+)"', document)]
+    assert widths
+    assert max(widths) <= 500  # a headless window is at least so wide
+
+
+def test_nothing_is_fetched(faults: Path) -> None:
+    text = faults.read_text("utf-8")
+    assert "default-src 'none'" in text
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.search(r"(src|href)\s*=", own)
+
+
+def test_faults_stand_where_they_came_and_went(faults: Path) -> None:
+    """By hand from the sample (docs: made-faults): raised at 0.689713203 s in packet 12, cleared 2.042 s later."""
+    (trace,) = traces(faults, "cell_volt_high_level_1")
+    (start, end) = trace["x"]
+    assert (end - start) / 1000 == pytest.approx(2.042, abs=0.001)
+
+
+def test_cells_are_those_of_the_capture(faults: Path) -> None:
+    (trace,) = traces(faults, "cell 11")
+    assert set(trace["y"]) <= {3286, 3287}
+
+
+def test_text_of_a_capture_stays_text(tmp_path: Path) -> None:
+    capture, page = tmp_path / "evil.pcapng", tmp_path / "evil.html"
+    frame = bytes.fromhex("a501900800f80000753001815d")
+    with open_writer(capture) as writer:
+        writer.add_interface(Interface(name=EVIL, description=f"dalyshark {EVIL}"))
+        writer.write_packet(1_700_000_000_000_000_000, frame)
+        writer.write_packet(1_700_000_000_100_000_000, b"", comment=EVIL)
+    assert main(["report", str(capture), "-o", str(page), "--title", EVIL]) == 0
+    assert EVIL not in page.read_text("utf-8")
+    document = browse(page, tmp_path)
+    title = re.search(r"<title>(.*?)</title>", document, re.DOTALL)
+    assert title
+    assert title[1].startswith("&lt;/script&gt;")
+    assert "\x1b" not in document
+
+
+def test_what_cannot_be_reported_is_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.html"
+    assert main(["report", str(tmp_path / "none.pcapng"), "-o", str(out)]) == 2
+    assert main(["report", str(SAMPLES / "made-faults.pcapng"), "-o", str(SAMPLES / "made-faults.pcapng")]) == 2
+    said = capsys.readouterr().err
+    assert "none.pcapng" in said
+    assert "name another file" in said
+    assert "Traceback" not in said
+    assert not out.exists()

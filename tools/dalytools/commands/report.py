@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""``dalyshark report``: a page to look at, of one capture or several, in one file that opens offline."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dalycapture.errors import CaptureError
+from dalycapture.reader import read_capture
+from dalyref.decoder import Decoder
+from dalytools import wire_times
+from dalytools.findings.limits import Limits
+from dalytools.findings.search import Search
+from dalytools.problem import Problem
+from dalytools.progress import progress_bar
+from dalytools.report.collect import Collected
+from dalytools.report.page import page
+from dalytools.terminal_text import plain
+from dalytools.whole_file import whole_file
+from dalytools.wires import choice
+from dalytools.wires.carriers import Carriers
+
+if TYPE_CHECKING:
+    import argparse
+
+    from dalyref.decoder import Decoded
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command line."""
+    parser.description = "Write a page with plots and tables of captures: one HTML file, opens offline in any browser."
+    parser.epilog = "Exit status: 0 written, 2 could not run, or a file did not read to its end (what did is shown)."
+    parser.add_argument("files", nargs="+", metavar="FILE", help="capture files, in the order of time")
+    parser.add_argument("-o", "--output", metavar="OUT.html", required=True, help="page to write")
+    parser.add_argument("--title", help="heading of the page (the files' names)")
+    wire_times.add_arguments(parser)
+    choice.add_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read all files, write the page."""
+    library = _library()
+    files: list[str] = args.files
+    output: str = args.output
+    if os.path.realpath(output) in {os.path.realpath(name) for name in files}:
+        raise Problem(f"{output} is one of the captures; name another file with -o")
+    collected = Collected()
+    found: list[tuple[str, str, str]] = []
+    problems: list[str] = []
+    for name in files:
+        search = Search(Limits())
+        _read(name, args, collected, search, problems)
+        where = f"{Path(name).name}: " if len(files) > 1 else ""
+        found += [
+            (str(finding.severity), finding.rule, f"{where}{finding.place}: {finding.text}. {finding.advice}")
+            for finding in search.findings()
+        ]
+    for problem in problems:
+        print(f"dalyshark report: {plain(problem)}", file=sys.stderr)  # noqa: T201
+    if not collected.records:
+        raise Problem("no record of a Daly bus in what was read, so no page was written")
+    collected.finish()
+    title: str = args.title or ", ".join(Path(name).name for name in files[:3]) + (" ..." if len(files) > 3 else "")
+    with whole_file(output) as out:
+        out.write(page(title, collected, found, library))
+    return 2 if problems else 0
+
+
+def _read(name: str, args: argparse.Namespace, collected: Collected, search: Search, problems: list[str]) -> None:
+    """Read one file; what is wrong with it is appended to `problems`."""
+    decoder, carriers = Decoder(wire_times.read(args)), Carriers(choice.read(args))
+
+    def take(records: list[Decoded]) -> None:
+        for record in records:
+            collected.add(record)
+            search.record(record)
+
+    with progress_bar(f"report {plain(Path(name).name)}") as advance:
+        try:
+            for count, packet in enumerate(read_capture(name), 1):
+                search.packet(packet)
+                for carrier in carriers.of(packet):
+                    take(decoder.feed(carrier))
+                if count % 1024 == 0:
+                    advance(count)
+        except CaptureError as error:
+            problems.append(str(error))
+        for carrier in carriers.finish():
+            take(decoder.feed(carrier))
+        take(decoder.finish())
+
+
+def _library() -> str:
+    """Return plotly.js, which comes with the Python package."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        raise Problem("plots need the package plotly: type  pip install 'dalyshark[report]'") from None
+    return str(get_plotlyjs())
