@@ -38,7 +38,7 @@ FILTERS: Final = (
 
 _CONTROLS: Final = (
     (HEARD, "string", "Heard", "Records so far; bad: damaged frames; boards that answered"),
-    (MARK_TEXT, "string", "Mark", "Text that the next mark carries"),
+    (MARK_TEXT, "string", "Mark", "Text of the next mark: type it, press Enter, then Set mark"),
     (MARK, "button", "Set mark", "Put a mark with this text into the capture, at this moment"),
 )
 _FORMATS: Final = ("8N1", "8E1", "8O1", "8N2", "7E1", "7O1")

@@ -76,7 +76,7 @@ def _capture(fifo: str, port: Port, settings: Settings, bus: str, options: dict[
     fd = _open_fifo(fifo)
     if fd is None:
         return _fail(f"{fifo}: Wireshark did not open it")
-    view = PcapngWriter(PipeOutput(fd, "Wireshark", goodbye_s=GOODBYE_S), application=_application())
+    view = _View(toolbar, PipeOutput(fd, "Wireshark", goodbye_s=GOODBYE_S), application=_application())
     sinks: list[CaptureWriter] = [view, *mirror]
     side = Side(port, tap_of(port, settings, bus=bus), settings=settings, wait_s=None)
     reporter = _Reporter(toolbar, sinks, port.name)
@@ -93,6 +93,19 @@ def _capture(fifo: str, port: Port, settings: Settings, bus: str, options: dict[
     return _fail("; ".join(notes)) if notes else 0
 
 
+class _View(PcapngWriter):
+    """The capture as Wireshark gets it; its events stand in the log window too."""
+
+    def __init__(self, toolbar: Toolbar, output: PipeOutput, *, application: str) -> None:
+        super().__init__(output, application=application)
+        self._toolbar = toolbar
+
+    def write_packet(self, time_ns: int, data: bytes, *, comment: str = "", **more: int) -> None:
+        if not data:
+            self._toolbar.log(f"{_now()} {comment}")
+        super().write_packet(time_ns, data, comment=comment, **more)
+
+
 class _Stoppable(Protocol):
     def stop(self) -> None: ...
 
@@ -104,7 +117,7 @@ class _Reporter:
         self.stop_when_gone: _Stoppable | None = None
         self._toolbar, self._view, self._sinks = toolbar, sinks[0], sinks
         self._next = 0.0
-        self._events = self._lost = 0
+        self._lost = 0
         self._text = ""
         mirrors = "".join(f", mirror file {sink.output.name}" for sink in sinks[1:])
         toolbar.log(f"{_now()} listening to {port}{mirrors}")
@@ -121,9 +134,6 @@ class _Reporter:
         if text != self._text:
             self._text = text
             self._toolbar.heard(text)
-        if tally.events != self._events:
-            self._events = tally.events
-            self._toolbar.log(f"{_now()} {counted(tally.events, 'event')} so far, {tally.marks} of them marks")
         for sink in self._sinks[1:]:
             if sink.lost != self._lost:
                 if not self._lost:

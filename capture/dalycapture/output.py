@@ -17,6 +17,7 @@ import os
 import select
 import stat
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -158,7 +159,10 @@ class FileOutput:
 
 
 class PipeOutput:
-    """A pipe, FIFO, socket or character device, never waited for, but at its end for goodbye_s seconds."""
+    """A pipe, FIFO, socket or character device, never waited for, but at its end for goodbye_s seconds.
+
+    Where the system can not tell when a pipe takes more (Windows), a thread waits for it instead of ``pump``.
+    """
 
     def __init__(self, fd: int, name: str, goodbye_s: float | None = None) -> None:
         self.name = name
@@ -166,12 +170,17 @@ class PipeOutput:
         self._fd = fd
         self._backlog = bytearray()
         self._goodbye_s = GOODBYE_S if goodbye_s is None else goodbye_s
-        self._poll = select.poll()
-        self._poll.register(fd, select.POLLOUT)
+        self._poll = select.poll() if hasattr(select, "poll") else None
+        self._more = threading.Condition()
+        self._broken: OSError | None = None
+        if self._poll:
+            self._poll.register(fd, select.POLLOUT)
+        else:
+            threading.Thread(target=self._work, name=f"writer of {name}", daemon=True).start()
 
     def fileno(self) -> int:
-        """Poll this for POLLERR (the reader went away) and, while something waits, for POLLOUT."""
-        return self._fd
+        """Poll this for POLLERR (the reader went away) and, while something waits, for POLLOUT; -1: it can't be."""
+        return self._fd if self._poll else -1
 
     @property
     def waiting(self) -> int:
@@ -184,14 +193,18 @@ class PipeOutput:
             self.pump()
             if len(self._backlog) + len(block) > BACKLOG_LIMIT:
                 return False
-        self._backlog += block
+        with self._more:
+            self._backlog += block
+            self._more.notify()
         self.size += len(block)
         self.pump()
         return True
 
     def pump(self) -> None:
         """Hand over what the pipe takes now. Raises OSError (EPIPE) when the reader went away."""
-        while True:
+        if self._broken:
+            raise self._broken
+        while self._poll:
             ready = self._poll.poll(0)
             events = ready[0][1] if ready else 0
             if events & (select.POLLERR | select.POLLNVAL):
@@ -206,10 +219,28 @@ class PipeOutput:
         with contextlib.suppress(OSError):
             self.pump()
             while self._backlog and (left := deadline - time.monotonic()) > 0:
-                self._poll.poll(left * 1000)
+                if self._poll:
+                    self._poll.poll(left * 1000)
+                else:
+                    time.sleep(min(left, 0.01))
                 self.pump()
         with contextlib.suppress(OSError):
             os.close(self._fd)
+
+    def _work(self) -> None:
+        while True:
+            with self._more:
+                self._more.wait_for(lambda: self._backlog)
+                piece = bytes(self._backlog[:PIPE_PIECE])
+            try:
+                done = os.write(self._fd, piece)
+            except OSError as error:
+                # Windows says EINVAL of a pipe whose reader is gone.
+                gone = error.errno in {errno.EPIPE, errno.EINVAL}
+                self._broken = BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)) if gone else error
+                return
+            with self._more:
+                del self._backlog[:done]
 
 
 def open_output(path: Path | str) -> FileOutput | PipeOutput:

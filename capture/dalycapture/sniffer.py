@@ -377,7 +377,8 @@ class Sniffer:
         for sink in tuple(self._sinks):
             if isinstance(sink.output, PipeOutput):
                 self._to(sink, lambda sink: sink.hand_on())
-                waiter.watch(sink.output.fileno(), write=sink.output.waiting > 0)
+                if (fd := sink.output.fileno()) >= 0:
+                    waiter.watch(fd, write=sink.output.waiting > 0)
         for sink in self._gone:
             if isinstance(sink.output, PipeOutput):
                 waiter.forget(sink.output.fileno())

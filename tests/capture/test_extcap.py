@@ -282,7 +282,9 @@ def test_toolbar_counts_and_marks(bus: Bus, tmp_path: Path) -> None:
         assert capture.said() == ""
     told = messages(capture.told)
     assert {control for control, command, _ in told if command == 1} == {extcap.HEARD}
-    assert any(control == extcap.LOG and command == 2 and bus.port in text for control, command, text in told)
+    log = "".join(text for control, command, text in told if (control, command) == (extcap.LOG, 2))
+    assert f"listening to {bus.port}\n" in log
+    assert "user mark 1: charger plugged in\n" in log
 
 
 @pytest.mark.parametrize(

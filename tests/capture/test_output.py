@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -151,6 +152,39 @@ def test_a_reader_that_went_away() -> None:
     with pytest.raises(BrokenPipeError):
         pipe.write(b"x")
     pipe.close()
+
+
+def test_a_system_that_can_not_poll_pipes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows: a thread waits for the reader, nobody else does."""
+    monkeypatch.delattr("select.poll")
+    reading, writing = os.pipe()
+    pipe = PipeOutput(writing, "pipe")
+    assert pipe.fileno() == -1
+    blocks = [bytes([n]) * 4000 for n in range(100)]
+    for block in blocks:
+        assert pipe.write(block)
+    got = b""
+    while len(got) < 400_000:
+        got += os.read(reading, 1 << 16)
+    assert got == b"".join(blocks)
+    os.close(reading)
+    end = time.monotonic() + 20
+    with pytest.raises(BrokenPipeError):  # noqa: PT012 - it is told when the thread has seen it
+        while time.monotonic() < end:
+            pipe.write(b"x")
+            time.sleep(0.001)
+    pipe.close()
+
+
+def test_a_pipe_without_poll_gives_the_rest_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("select.poll")
+    reading, writing = os.pipe()
+    pipe = PipeOutput(writing, "pipe")
+    assert pipe.write(b"the rest")
+    pipe.close()
+    assert os.read(reading, 100) == b"the rest"
+    assert os.read(reading, 100) == b""
+    os.close(reading)
 
 
 def test_bus_names() -> None:

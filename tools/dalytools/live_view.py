@@ -60,7 +60,8 @@ class LiveView:
         finally:
             os.close(reader)
         os.set_inheritable(writer, False)
-        os.set_blocking(writer, False)
+        if os.name != "nt":  # a thread writes there, see PipeOutput
+            os.set_blocking(writer, False)
         self.sink = PcapngWriter(PipeOutput(writer, "tshark"), application=application)
         self._show, self._ended = show, ended
         self._given_up = False
