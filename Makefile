@@ -6,7 +6,7 @@ RUN_SETUP := @tools/setup.sh run
 DEV_SETUP := @tools/setup.sh dev
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint format matrix soak fuzz bench samples docs dist wheel clean
+.PHONY: help setup run test lint format matrix soak fuzz crash bench samples docs dist wheel clean
 MAKEFLAGS += --no-builtin-rules
 
 help: ## show this list
@@ -41,6 +41,10 @@ soak: ## a million records, good and damaged, through both readings, in every Wi
 fuzz: ## a million mutated packets through the dissector, in every Wireshark that make matrix fetched
 	$(DEV_SETUP)
 	@$(PY) -m bench.fuzz $(ARGS)
+
+crash: ## kills, torn ends, a full disk: what is left of a capture; and how fast Wireshark's capture tool is
+	$(DEV_SETUP)
+	@$(PY) -m bench.crash $(ARGS)
 
 bench: ## speed and memory, beside named peers
 	$(DEV_SETUP)

@@ -10,6 +10,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from bench.crash import kills
 from tests.capture.bus import Bus, numbered
 
 from dalycapture.errors import TruncatedError
@@ -57,3 +58,8 @@ def test_killed_at_random_moments(tmp_path: Path) -> None:
             got.extend(packet.data for packet in read_capture(path))
         assert got == [numbered(n) for n in range(len(got))]
         assert reported <= len(got) <= sent
+
+
+def test_killed_torn_and_appended_to(tmp_path: Path) -> None:
+    """The short form of `make crash`: each life goes on in the same file, every fourth end is torn by hand."""
+    assert kills(5, tmp_path)
