@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from tests.capture.bus import Bus, numbered
 from tests.capture.extcap_tool import START, Home
-from tests.capture.test_passive import STRACE, can_trace
+from tests.capture.test_passive import STRACE, calls_on, can_trace
 
 from dalycapture import extcap
 from dalycapture.adapters import Adapter
@@ -195,7 +195,7 @@ def until(condition: Callable[[], object]) -> None:
 class Capture:
     """The tool as the window starts it."""
 
-    def __init__(self, folder: Path, port: str, *words: str) -> None:
+    def __init__(self, folder: Path, port: str, *words: str, under: tuple[str, ...] = ()) -> None:
         self.fifo, self.outward, self.inward = (folder / name for name in ("fifo", "out", "in"))
         for path in (self.fifo, self.outward, self.inward):
             os.mkfifo(path)
@@ -203,7 +203,19 @@ class Capture:
         self.told = b""
         pipes = ["--fifo", self.fifo, "--extcap-control-out", self.outward, "--extcap-control-in", self.inward]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", START, "--capture", "--extcap-interface", "daly", "--port", port, *pipes, *words],
+            [
+                *under,
+                sys.executable,
+                "-c",
+                START,
+                "--capture",
+                "--extcap-interface",
+                "daly",
+                "--port",
+                port,
+                *pipes,
+                *words,
+            ],
             stderr=subprocess.PIPE,
         )
         self._told = os.open(self.outward, os.O_RDONLY | os.O_NONBLOCK)
@@ -242,8 +254,8 @@ class Capture:
 
 
 @contextmanager
-def captured(folder: Path, port: str, *words: str) -> Generator[Capture]:
-    capture = Capture(folder, port, *words)
+def captured(folder: Path, port: str, *words: str, under: tuple[str, ...] = ()) -> Generator[Capture]:
+    capture = Capture(folder, port, *words, under=under)
     try:
         yield capture
     finally:
@@ -356,6 +368,27 @@ def test_defaults_hold_when_options_are_missing(bus: Bus, tmp_path: Path) -> Non
         until(lambda: len(capture.read()) == 1)
         (packet,) = capture.read()
     assert packet.description.startswith(f"dalyshark bus=main 9600 8N1 {bus.port}; ")
+
+
+@pytest.mark.skipif(not can_trace(), reason="strace is missing or may not trace here (ptrace)")
+def test_nothing_but_listening(bus: Bus, tmp_path: Path) -> None:
+    """As test_passive has it for `dalyshark capture`: no write, no flush, no modem line moved, a mark meanwhile."""
+    trace = tmp_path / "trace"
+    with captured(tmp_path, bus.port, under=(str(STRACE), "-f", "-y", "-o", str(trace))) as capture:
+        bus.send(numbered(1))
+        until(lambda: len(capture.read()) == 1)
+        os.write(capture.control, message(extcap.MARK, 1, ""))
+        until(lambda: len(capture.read()) == 2)
+        assert bus.heard() == b""
+        os.close(capture.data)
+        assert capture.said() == ""
+    calls = calls_on(trace.read_text(encoding="utf-8", errors="replace"), bus.port)
+    on_port = [(name, rest) for name, rest in calls if re.match(rf"\d+<{bus.port}[<>]", rest)]
+    names = {name for name, _ in on_port}
+    assert {"ioctl", "read"} <= names
+    assert not {"write", "writev", "sendto"} & names
+    forbidden = r"TIOCM(BIS|BIC|SET)|TCSBRK|TIOCSBRK|TIOCSTI|TCFLSH|TCSETSF|TCSETSW|TCXONC"
+    assert not [rest for name, rest in on_port if name == "ioctl" and re.search(forbidden, rest)]
 
 
 # --- the real tshark, as an ordinary user ---------------------------------------------------------------------------

@@ -206,6 +206,18 @@ def test_two_sides_in_order_of_time(tmp_path: Path) -> None:
     assert got[0].description == host.description  # ours is kept as it is
 
 
+def test_a_clock_that_steps_back_moves_no_byte(tmp_path: Path) -> None:
+    """While the other side holds all up, this side's records wait together: they stay in their order."""
+    got = reframed(
+        tmp_path,
+        [P(FRAME[:3], 0, 1), P(OTHER, 90, 0), P(FRAME, 40, 0), P(FRAME[3:], 3.1, 1)],
+        tap("x"),
+        tap("y"),
+    )
+    assert [p.data for p in got if p.interface == 0] == [OTHER, FRAME]
+    assert [p.time_ns - EPOCH for p in got if p.interface == 0] == [90 * MS, 40 * MS]
+
+
 def test_interfaces_are_kept_and_ours_is_said(tmp_path: Path) -> None:
     """A silent one too; a stranger's is told to be a serial line for our dissector."""
     told: list[Interface] = []

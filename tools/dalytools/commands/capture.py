@@ -14,6 +14,7 @@ from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
 from dalycapture.interface import bus_name
 from dalycapture.linktype import DEFAULT_LINK_TYPE, check_link_type
+from dalycapture.rotation import FileSeries
 from dalycapture.sniffer import End, Limits, Sniffer, Tally
 from dalycapture.writer import counted
 from dalytools import __version__, file_options
@@ -97,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
         raise Problem(str(error)) from None
     tally.notes += sink.notes
     if not args.quiet:
-        print(summary(tally, named(taps), args.output, args.baud), file=sys.stderr)  # noqa: T201 - for the terminal
+        print(summary(tally, named(taps), _where(sink, args.output), args.baud), file=sys.stderr)  # noqa: T201 - for the terminal
     if args.stats:
         write_statistics(args.stats, tally, {"output": args.output})
     if sink.lost:
@@ -125,6 +126,14 @@ def _capture(
             keys = stack.enter_context(Keys(sniffer.mark))
             status.hint = f"  {'m marks, ' if keys.there else ''}Ctrl-C ends"
         return sniffer.run(stop_signals=(signal.SIGINT, signal.SIGTERM), user_signals=True), sink
+
+
+def _where(sink: CaptureWriter, asked: str) -> str:
+    """Name the file that was written; of several the last."""
+    output = sink.output
+    if not isinstance(output, FileSeries) or output.name == asked:
+        return asked
+    return f"{output.name}, the last of {counted(output.number, 'file')}"
 
 
 def _positive(text: str) -> int:
