@@ -115,7 +115,6 @@ def test_other_texts_are_left_alone(tshark: Tshark, path: Path) -> None:
     [
         "",
         "\n\n# only a comment\n",
-        "(1700000000.000000) can0 18900140#0000000000000000\n",
         "time,voltage\n2023-11-14 22:13:20,53.2\n",
         "2023-11-14 22:13:20;53;20\n",
         "1700000000,12,34\n",

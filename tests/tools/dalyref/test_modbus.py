@@ -28,7 +28,6 @@ def with_crc(head: str) -> bytes:
         ("d210000c00029268", Dialect.D2),  # its reply
         ("811001400002743073f02ca9", Dialect.P81),  # the vendor's app
         ("d21000d40003180b0709341cf7d8", Dialect.D2),
-        ("81100f05000200000000876a", Dialect.P81),
     ],
 )
 def test_papers_and_field(frame: str, dialect: Dialect) -> None:
