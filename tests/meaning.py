@@ -8,7 +8,7 @@ case does not name must not be there.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,11 +27,15 @@ WATCHED = tuple(f"daly.{name}" for name in _WATCHED.split())
 
 @dataclass(frozen=True)
 class Heard:
-    """A frame: bytes as hex, when it begins (s), and what is expected of it, by field name without ``daly.``."""
+    """A frame: bytes as hex, when it begins (s), and what is expected of it, by field name without ``daly.``.
+
+    side: inbound or outbound, where the tap tells.
+    """
 
     frame: str
     at: float
     expect: Mapping[str, object] = field(default_factory=dict[str, object])
+    side: Literal["", "inbound", "outbound"] = ""
 
 
 def a5(address: int, data_id: int, data: str = "") -> str:

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dalyref import addresses, bursts, cells, parts, payload, writes
+from dalyref import addresses, bursts, cells, links, parts, payload, writes
 from dalyref.board import Board, Seen
 from dalyref.bursts import Burst
 from dalyref.exchange import Exchange
-from dalyref.options import NANO, TOLERANCE_NS
+from dalyref.modbus_bus import ModbusBus
 from dalyref.slate import Slate
+from dalyref.soc import StatesOfCharge
 
 if TYPE_CHECKING:
-    from dalyref.exchange import Request
     from dalyref.message import Message
     from dalyref.options import Options
     from dalyref.streams import Located
@@ -35,14 +35,15 @@ class Bus:
         self._reply_ns = options.limit_ns(options.reply)
         self._burst_ns = options.limit_ns(options.burst)
         self._exchange = Exchange[Slate](options, echoes=echoes)
+        self._charge = StatesOfCharge(options)
+        self._modbus = ModbusBus(options, self._charge)
         self._asked: dict[int, int] = {}  # requests seen, by data ID
         self._boards: dict[int, Board] = {}  # by address byte of replies
         self._burst: Burst[Slate] | None = None
 
     def frame(self, located: Located, message: Message, fields: Fields) -> Slate:
         """Take a frame: add what it means to its `fields`, and to those of records before it."""
-        slate = Slate(fields, self)
-        self._exchange.pass_time(located.start_ns)
+        slate = self._slate(located, fields)
         if not payload.is_known(message.data_id):
             fields["daly.unknown_id"] = True
         if message.route.asks:
@@ -50,6 +51,18 @@ class Bus:
         else:
             self._reply(located, message, slate)
         return slate
+
+    def modbus_frame(self, located: Located, data: bytes, fields: Fields) -> Slate:
+        """Take a Modbus frame, all of its bytes, in the same way."""
+        slate = self._slate(located, fields)
+        self._modbus.frame(located, data, slate)
+        return slate
+
+    def _slate(self, located: Located, fields: Fields) -> Slate:
+        """Begin with a frame of any dialect: time passes for all."""
+        self._exchange.pass_time(located.start_ns)
+        self._modbus.pass_time(located.start_ns)
+        return Slate(fields, self)
 
     def settle(self, slate: Slate, latest_ns: int) -> None:
         """Nothing more shall come to this record: its time is over, or the capture.
@@ -87,8 +100,9 @@ class Bus:
         slate.asks = True
 
     def _reply(self, located: Located, message: Message, slate: Slate) -> None:
-        fields, data_id = slate.fields, message.data_id
+        fields, data_id, address = slate.fields, message.data_id, message.route.address
         fields["daly.direction"] = addresses.REPLY
+        self._charge.replied(address)
         if message.route.board:
             fields["daly.board"] = message.route.board
         if not message.whole:
@@ -99,7 +113,10 @@ class Bus:
             self._end_burst()
             self._answer(located, message, slate)
             fields.update(payload.decode(data_id, message.content))
-            self._board(message.route.address).reply(_seen(located), data_id, message.content, fields)
+            seen = _seen(located)
+            self._board(address).reply(seen, data_id, message.content, fields)
+            if data_id == payload.PACK:
+                self._charge.told_by_a5(seen, address, payload.charge(message.content), fields)
 
     def _answer(self, located: Located, message: Message, slate: Slate) -> int:
         """Find the request of a reply; return its number, 0: none."""
@@ -113,22 +130,10 @@ class Bus:
             fields["daly.other_board"] = True
         if answer.request is None:
             return 0
-        self._link(answer.request, located, message, slate)
+        links.link(answer.request, located, slate)
+        if answer.request.written and message.whole:
+            fields["daly.write_result"] = writes.result(message.data_id, answer.request.written, message.content)
         return answer.request.number
-
-    @staticmethod
-    def _link(request: Request[Slate], located: Located, message: Message, slate: Slate) -> None:
-        """Tell a request and its reply about each other."""
-        fields = slate.fields
-        fields["daly.request_in"] = request.number
-        after_ns = located.start_ns - request.end_ns
-        if after_ns >= -TOLERANCE_NS:  # else the time stamps can't tell
-            fields["daly.response_time"] = max(after_ns, 0) / NANO
-        if request.written and message.whole:
-            fields["daly.write_result"] = writes.result(message.data_id, request.written, message.content)
-        request.owner.fields["daly.reply_in"] = located.packet.number
-        request.owner.asks = False
-        request.owner.close()
 
     def _board(self, address: int) -> Board:
         board = self._boards.get(address)

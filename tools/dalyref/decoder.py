@@ -236,8 +236,11 @@ class Decoder:
         slate: Slate | None = None
         if record is not None:
             _describe(record, fields)
-            if kind is Kind.FRAME and record.dialect is Dialect.A5:
-                slate = bus.frame(located, from_serial(data), fields)
+            if kind is Kind.FRAME:
+                if record.dialect is Dialect.A5:
+                    slate = bus.frame(located, from_serial(data), fields)
+                else:
+                    slate = bus.modbus_frame(located, data, fields)
         decoded = Decoded(
             packet.number,
             located.start_ns,
@@ -288,7 +291,6 @@ def _describe(record: Record, fields: Fields) -> None:
         fields["daly.modbus.function"] = data[1]
         fields["daly.modbus.crc"] = int.from_bytes(data[-2:], "little")
         fields["daly.modbus.crc.status"] = 1
-        fields["daly.undecoded"] = data[2:-2].hex()
     else:
         if kind is Kind.FOREIGN:
             fields["daly.foreign"] = record.foreign

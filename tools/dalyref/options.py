@@ -35,6 +35,8 @@ class Options:
     """92 against the sensors of 96, C."""
     sum_tolerance: float = 1
     """Pack voltage against the sum of the cells, %."""
+    soc_tolerance: float = 1
+    """SOC as A5 tells it against SOC as Modbus does, %."""
 
     def characters_ns(self, count: int) -> int:
         """Return how long `count` characters take on the wire, in ns."""

@@ -35,6 +35,14 @@ _MOS = Struct(">B??BL")
 _STATUS = Struct(">5BH")
 
 
+PACK = 0x90
+
+
+def charge(data: bytes) -> int:
+    """Return the state of charge of a 90, 0.1 %."""
+    return int.from_bytes(data[6:8])
+
+
 def pack(data: bytes) -> Fields:
     """90: pack and gather voltage (V), current (A, as sent), state of charge (%)."""
     voltage, gather, current, soc = _PACK.unpack(data)
@@ -124,7 +132,7 @@ def _temperatures(data: bytes) -> Fields:
 
 
 DECODERS: dict[int, Callable[[bytes], Fields]] = {
-    0x90: pack,
+    PACK: pack,
     0x91: cell_extremes,
     0x92: temperature_extremes,
     0x93: mos,

@@ -52,19 +52,21 @@ def switch(raw: bytes) -> bool:
 
 def date(raw: bytes) -> str | None:
     """Give YY MM DD as 20YY-MM-DD, as sent (no calendar is asked); none where all is 00 or all is FF."""
-    if raw in (bytes(len(raw)), b"\xff" * len(raw)):
-        return None
-    year, month, day = raw[:3]
-    return f"20{year:02d}-{month:02d}-{day:02d}"
+    return None if _unset(raw[:3]) else _day(raw)
 
 
 def clock(raw: bytes) -> str | None:
     """Give YY MM DD hh mm ss as 20YY-MM-DD hh:mm:ss, the same way."""
-    day = date(raw)
-    if day is None:
-        return None
     hours, minutes, seconds = raw[3:6]
-    return f"{day} {hours:02d}:{minutes:02d}:{seconds:02d}"
+    return None if _unset(raw[:6]) else f"{_day(raw)} {hours:02d}:{minutes:02d}:{seconds:02d}"
+
+
+def _unset(raw: bytes) -> bool:
+    return raw in (bytes(len(raw)), b"\xff" * len(raw))
+
+
+def _day(raw: bytes) -> str:
+    return f"20{raw[0]:02d}-{raw[1]:02d}-{raw[2]:02d}"
 
 
 def text(raw: bytes) -> str | None:

@@ -19,3 +19,12 @@ def put(fields: Fields, name: str, values: Sequence[Value]) -> None:
         fields[name] = values[0]
     elif values:
         fields[name] = list(values)
+
+
+def add(fields: Fields, name: str, value: Value) -> None:
+    """Add one more value behind those that a field has."""
+    before = fields.get(name)
+    if before is None:
+        fields[name] = value
+    else:
+        fields[name] = [*(before if isinstance(before, list) else [before]), value]

@@ -303,6 +303,8 @@ def test_the_other_kinds() -> None:
         "daly.modbus.function": 3,
         "daly.modbus.crc": 0xAA57,
         "daly.modbus.crc.status": 1,
-        "daly.undecoded": "000c0001",
+        "daly.modbus.register": 12,
+        "daly.modbus.count": 1,
+        "daly.direction": 1,
     }
     assert read(bytes.fromhex("811001400002743073f02ca9"))["daly.dialect"] == "81"

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""How the registers of a dialect are read (docs/protocol.md, d): ``registers_d2`` and ``registers_81`` have the tables.
+
+A value whose registers are not all there, or of which one reads FFFF (a register that the board does not have), is
+none; but texts, where FF is padding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from dalyref import quantities
+from dalyref.quantities import Meaning
+from dalyref.values import put
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from dalyref.values import Fields
+
+ABSENT = 0xFFFF
+
+Row: TypeAlias = tuple[int, int, str, Meaning]
+"""First register, last register, field, meaning."""
+
+
+# What a register stands for where it differs from the bytes of other wires.
+
+
+def small(raw: bytes) -> int | None:
+    """Give a number that is one byte on other wires; none above 255."""
+    value = int.from_bytes(raw)
+    return value if value <= 0xFF else None
+
+
+def celsius(raw: bytes) -> int | None:
+    """Give a temperature, C, sent with offset 40; none above 255."""
+    value = small(raw)
+    return None if value is None else value - 40
+
+
+def celsius_not_0(raw: bytes) -> int | None:
+    """Give a temperature in the same way; none where it is 0 too."""
+    return celsius(raw) if any(raw) else None
+
+
+def milliamperes(raw: bytes) -> int:
+    """Give a current, mA, sent with offset 30000."""
+    return int.from_bytes(raw) - 30000
+
+
+def milliamperes_not_0(raw: bytes) -> int | None:
+    """Give a current in the same way; none where it is 0."""
+    return milliamperes(raw) if any(raw) else None
+
+
+def backward(raw: bytes) -> str | None:
+    """Give a text that is sent last character first."""
+    sent = quantities.text(raw)
+    return None if sent is None else sent[::-1]
+
+
+_PADDED = (quantities.text, backward)
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterMap:
+    """Where a dialect keeps what."""
+
+    told: tuple[Row, ...]
+    """Shown on replies to reads."""
+    settings: tuple[Row, ...]
+    """Shown on replies to reads, and on writes."""
+    cells: tuple[int, ...]
+    """Register of each cell, cell 1 first (mV)."""
+    sensors: tuple[int, ...]
+    """Register of each sensor, sensor 1 first (C + 40)."""
+    cell_count: int
+    sensor_count: int
+    charge: int
+    """SOC, 0.1 %."""
+    faults: tuple[int, ...] = ()
+    """The registers with the eight bytes of 98, low byte first."""
+    commands: Mapping[int, str] | None = None
+    """What a write does, whatever the value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Registers:
+    """Some registers in a row, with their values."""
+
+    start: int
+    data: bytes
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return len(self.data) // 2
+
+    def __contains__(self, register: int) -> bool:
+        return self.start <= register < self.start + self.count
+
+    def raw(self, first: int, last: int) -> bytes | None:
+        """Return the bytes of registers `first` to `last`; None where they are not all there."""
+        if first not in self or last not in self:
+            return None
+        return self.data[2 * (first - self.start) : 2 * (last + 1 - self.start)]
+
+    def value(self, register: int) -> int | None:
+        """Return one register; None where it is not there, or reads FFFF."""
+        raw = self.raw(register, register)
+        value = ABSENT if raw is None else int.from_bytes(raw)
+        return None if value == ABSENT else value
+
+    def absent(self) -> list[int]:
+        """Return the numbers of the registers that read FFFF."""
+        return [self.start + at for at in range(self.count) if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
+
+    def named(self, rows: Iterable[Row]) -> Fields:
+        """Return the values that the rows of a table name."""
+        fields: Fields = {}
+        for first, last, name, meaning in rows:
+            raw = self.raw(first, last)
+            if raw is None:
+                continue
+            if meaning not in _PADDED and any(raw[at : at + 2] == b"\xff\xff" for at in range(0, len(raw), 2)):
+                continue
+            value = meaning(raw)
+            if value is not None:
+                fields["daly." + name] = value
+        return fields
+
+
+def would_set(registers: Registers, table: RegisterMap) -> Fields:
+    """Return what a write of these registers asks for."""
+    fields = registers.named(table.settings)
+    if table.commands:
+        put(fields, "daly.command", [name for register, name in table.commands.items() if register in registers])
+    return fields
