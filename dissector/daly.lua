@@ -88,6 +88,8 @@ prefs.temperature_tolerance =
 prefs.sum_tolerance =
   Pref.uint("Tolerance of the pack voltage (%)", 1, "The pack voltage and the sum of the cells may differ by so much")
 
+prefs.soc_tolerance = Pref.uint("Tolerance of the SOC (%)", 1, "The SOC over A5 and over Modbus may differ by so much")
+
 local function seconds(milliseconds)
   return milliseconds / 1000
 end
@@ -108,6 +110,7 @@ local function begin()
     cell_tolerance = prefs.cell_tolerance,
     temperature_tolerance = prefs.temperature_tolerance,
     sum_tolerance = prefs.sum_tolerance,
+    soc_tolerance = prefs.soc_tolerance,
   }
   view.init(options)
   serial.init(options)

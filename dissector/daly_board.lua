@@ -10,13 +10,18 @@
 local results_module = require("daly_results")
 local exchange = require("daly_exchange")
 local settings = require("daly_settings")
+local soc = require("daly_soc")
 
 local M = {}
 
 local byte, char, sub, format = string.byte, string.char, string.sub, string.format
 local GRACE = exchange.GRACE
 
-local MOST_CELLS, MOST_SENSORS = 48, 21
+local contradict, change = results_module.contradict, results_module.change
+
+--- Counts above these are ignored.
+M.MOST_CELLS, M.MOST_SENSORS = 48, 21
+local MOST_CELLS, MOST_SENSORS = M.MOST_CELLS, M.MOST_SENSORS
 
 local function board_of(state, address)
   local board = state.boards[address]
@@ -25,21 +30,6 @@ local function board_of(state, address)
     state.boards[address] = board
   end
   return board
-end
-
-local function contradict(results, slot, name, packet, words)
-  local odd = results_module.odd(results, slot)
-  local list = odd.contradictions or {}
-  odd.contradictions = list
-  local n = #list
-  list[n + 1], list[n + 2], list[n + 3] = name, packet, words
-end
-
-local function change(results, slot, name, from)
-  local odd = results_module.odd(results, slot)
-  odd.changed = odd.changed or {}
-  odd.changed[#odd.changed + 1] = name
-  odd.from = from
 end
 
 -- Whether another record (or none) is new enough to say something about the same moment.
@@ -159,6 +149,7 @@ take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
   if is_new(bus, cells, starts) then
     compare_sum(bus, slot, mine, cells, cells, "the newest table of 0x95")
   end
+  soc.of_a5(bus, slot, byte(raw, 2), mine, starts)
   return board.state
 end
 
@@ -267,8 +258,8 @@ function M.note_before(bus, slot, address, id)
     local on = id == 0xDA and board.charge or id == 0xD9 and board.discharge
     was, was_in = (on and "\1" or "\0") .. ("\0"):rep(7), board.mos_in
   elseif id == 0x21 and board.pack then
-    local soc = board.pack.soc
-    was, was_in = ("\0"):rep(6) .. char(math.floor(soc / 256), soc % 256), board.pack.packet
+    local charge = board.pack.soc
+    was, was_in = ("\0"):rep(6) .. char(math.floor(charge / 256), charge % 256), board.pack.packet
   elseif board.settings and board.settings[id + 0x40] then
     was, was_in = board.settings[id + 0x40], board.settings[-id - 0x40]
   end

@@ -6,7 +6,9 @@
 --        --reply----> daly_bursts (several frames), daly_board  table, text; what changed, what contradicts
 --                     and daly_exchange                         the request it belongs to
 --
--- feed() is called once per A5 frame, in the order of the capture. What it finds out is kept in daly_results' columns,
+--        --Modbus---> daly_modbus_board                      registers, what changed; daly_modbus_exchange the request
+--
+-- feed() is called once per frame, in the order of the capture. What it finds out is kept in daly_results' columns,
 -- so that an ordinary frame costs no table.
 --
 -- A frame of CAN comes in the form of an A5 frame, on a bus that says so (bus.can): its length may be other than 8, its
@@ -18,17 +20,20 @@ local exchange = require("daly_exchange")
 local results_module = require("daly_results")
 local bursts = require("daly_bursts")
 local boards = require("daly_board")
+local modbus_board = require("daly_modbus_board")
+local soc = require("daly_soc")
 
 local M = {}
 
 local byte = string.byte
 local BURST_IDS = bursts.IDS
+local A5 = 0xA5
 
 -- So many frames of others are remembered while one stream's last frame is uncertain; then it counts as certain.
 local MOST_UNCERTAIN = 500
 
 --- A bus with nothing remembered. `times` = { echo =, reply =, late =, burst =, age = } in seconds, and tolerances:
--- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance (%).
+-- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance, soc_tolerance (%).
 function M.new(times, results)
   local state = exchange.state()
   state.boards = {} -- by address byte of replies
@@ -38,10 +43,10 @@ function M.new(times, results)
   return bus
 end
 
---- One A5 frame. `slot`: the frame's own number for the results; `number`: of its packet; `raw`: its 13 bytes;
+--- One frame, A5 or Modbus. `slot`: the frame's own number for the results; `number`: of its packet; `raw`: its bytes;
 -- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from.
 function M.feed(bus, slot, number, raw, starts, ends, side, owner)
-  local address, id = byte(raw, 2, 3)
+  local first, address, id = byte(raw, 1, 3)
   local results, state = bus.results, bus.state
   local link, wait, memory = results.link, results.wait, results.memory
   local mark = bus.mark
@@ -56,6 +61,13 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
   -- A clock that steps back does not revive a request.
   if starts > state.latest then
     state.latest = starts
+  end
+  if first ~= A5 then
+    modbus_board.feed(bus, slot, number, raw, starts, ends, side)
+    return
+  end
+  if address < 0x20 and state.only ~= address then
+    soc.note_address(state, address)
   end
   -- Something for every frame: columns without gaps are lists, which take less room and time.
   if address >= 0x20 then

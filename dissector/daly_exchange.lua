@@ -51,8 +51,8 @@ local function forget_old(state, now, limit)
   state.last, state.remembered = kept, count
 end
 
--- Put a request to those that can be answered, and let go of those that can't.
-local function remember(state, id, request, late)
+--- Put a request to those that can be answered (`id`: what they are listed by), and let go of those that can't.
+function M.remember(state, id, request, late)
   local list = state.asked[id]
   if not list then
     list = { first = 1, last = 0 }
@@ -107,7 +107,7 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     end
   end
   state.last[raw] = request
-  remember(state, id, request, times.late)
+  M.remember(state, id, request, times.late)
   local host = names and 0x40 or address
   if state.host and state.host ~= host and starts - state.host_ended <= times.reply + GRACE then
     odd_of(bus.results, slot).second_host = true

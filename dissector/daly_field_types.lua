@@ -25,6 +25,7 @@ function M.new()
   local function add(short, abbreviation, make)
     local field = make("daly." .. abbreviation)
     fields[short] = field
+    fields[abbreviation] = fields[abbreviation] or field -- tables of facts name fields as people type them
     list[#list + 1] = field
   end
   return { fields = fields, list = list, add = add }

@@ -14,7 +14,7 @@ M.KINDS = { "frame", "bad_checksum", "short", "junk", "foreign", "event" }
 
 local DIRECTION = { [1] = "Request", [2] = "Reply", [3] = "Echo" }
 local CHECKSUM = { [0] = "Bad", [1] = "Good", [2] = "Unverified" }
-local STATE = { [0] = "stationary", [1] = "charging", [2] = "discharging" }
+local STATE = require("daly_settings").NAMES.state
 local CHARGER = { [0] = "disconnected", [1] = "connected" }
 
 M.STATE = STATE
@@ -220,6 +220,9 @@ M.experts = {
   cleared = ProtoExpert.new("daly.fault.cleared", "Fault cleared", expert.group.RESPONSE_CODE, expert.severity.NOTE),
   changed = ProtoExpert.new("daly.switched", "State or switch changed", expert.group.RESPONSE_CODE, expert.severity.NOTE),
   contradiction = ProtoExpert.new("daly.contradictory", "Two records contradict each other", expert.group.PROTOCOL, expert.severity.NOTE),
+  ambiguous = ProtoExpert.new("daly.modbus.several_requests", "Requests for different registers wait that this reply fits: its registers can't be named", expert.group.SEQUENCE, expert.severity.NOTE),
+  exception = ProtoExpert.new("daly.modbus.refused", "The board refuses", expert.group.RESPONSE_CODE, expert.severity.WARN),
+  cell_13 = ProtoExpert.new("daly.modbus.cell_13", "Register 000C is the switch in the example of the vendor's article; in truth it is the voltage of cell 13, and a write to it switches nothing. The switches are 00A5 and 00A6", expert.group.PROTOCOL, expert.severity.NOTE),
   again = ProtoExpert.new("daly.burst.repeated", "Frame repeated in a burst", expert.group.SEQUENCE, expert.severity.WARN),
 }
 

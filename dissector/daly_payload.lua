@@ -241,6 +241,38 @@ local function statistics(values, one_absent, other_absent)
   return lowest, low_at, highest, high_at, count > 0 and sum / count
 end
 
+--- The table of all cells (mV).
+function M.show_cells(cells, out)
+  local lowest, low_at, highest, high_at, average = statistics(cells)
+  for i = 1, #cells do
+    out.made_cell(fields.cells_voltage, fields["cell." .. i], cells[i], i == low_at, i == high_at)
+  end
+  out.made(fields.cells_count, #cells)
+  out.made(fields.cells_min, lowest, " mV")
+  out.made(fields.cells_min_number, low_at)
+  out.made(fields.cells_max, highest, " mV")
+  out.made(fields.cells_max_number, high_at)
+  out.made(fields.cells_average, average, " mV")
+  out.made(fields.cells_spread, highest - lowest, " mV")
+end
+
+--- The table of all sensors (raw, offset 40).
+function M.show_sensors(sensors, out)
+  for i = 1, #sensors do
+    out.made(fields.sensors_temperature, sensors[i] - 40, " C")
+  end
+  out.made(fields.sensors_count, #sensors)
+  local lowest, low_at, highest, high_at, average = statistics(sensors, 0, 0xFF)
+  if lowest then
+    out.made(fields.sensors_min, lowest - 40, " C")
+    out.made(fields.sensors_min_number, low_at)
+    out.made(fields.sensors_max, highest - 40, " C")
+    out.made(fields.sensors_max_number, high_at)
+    out.made(fields.sensors_average, average - 40, " C")
+    out.made(fields.sensors_spread, highest - lowest, " C")
+  end
+end
+
 -- 0x95: frame_number.1 cell.2 cell.2 cell.2 reserved.1
 show[0x95] = function(frame, out)
   local burst, odd = burst_of(frame)
@@ -256,19 +288,8 @@ show[0x95] = function(frame, out)
     out.cell(fields.cell_voltage, 1 + 2 * i, 2, before + i + 1, high * 256 + low)
   end
   out.bytes(fields.reserved, 1 + 2 * real, 7 - 2 * real)
-  local cells = frame.table
-  if cells then
-    local lowest, low_at, highest, high_at, average = statistics(cells)
-    for i = 1, #cells do
-      out.made_cell(fields.cells_voltage, fields["cell." .. i], cells[i], i == low_at, i == high_at)
-    end
-    out.made(fields.cells_count, #cells)
-    out.made(fields.cells_min, lowest, " mV")
-    out.made(fields.cells_min_number, low_at)
-    out.made(fields.cells_max, highest, " mV")
-    out.made(fields.cells_max_number, high_at)
-    out.made(fields.cells_average, average, " mV")
-    out.made(fields.cells_spread, highest - lowest, " mV")
+  if frame.table then
+    M.show_cells(frame.table, out)
   end
 end
 
@@ -323,21 +344,8 @@ show[0x96] = function(frame, out)
   if real < 7 then
     out.bytes(fields.reserved, 1 + real, 7 - real)
   end
-  local sensors = frame.table
-  if sensors then
-    for i = 1, #sensors do
-      out.made(fields.sensors_temperature, sensors[i] - 40, " C")
-    end
-    out.made(fields.sensors_count, #sensors)
-    local lowest, low_at, highest, high_at, average = statistics(sensors, 0, 0xFF)
-    if lowest then
-      out.made(fields.sensors_min, lowest - 40, " C")
-      out.made(fields.sensors_min_number, low_at)
-      out.made(fields.sensors_max, highest - 40, " C")
-      out.made(fields.sensors_max_number, high_at)
-      out.made(fields.sensors_average, average - 40, " C")
-      out.made(fields.sensors_spread, highest - lowest, " C")
-    end
+  if frame.table then
+    M.show_sensors(frame.table, out)
   end
 end
 
@@ -591,6 +599,24 @@ function M.write_words(id, raw, was, was_in)
   return text, full
 end
 
+--- What is to be said of the level 2 faults in the eight bytes of 0x98, or nil.
+function M.severe(data)
+  if data == NO_FAULTS then
+    return nil
+  end
+  local names, _, severe = faults.read(data, 1)
+  if not severe then
+    return nil
+  end
+  local level_2 = {}
+  for i = 1, #names do
+    if names[i]:sub(-8) == "_level_2" then
+      level_2[#level_2 + 1] = names[i]
+    end
+  end
+  return "Level 2 fault: " .. concat(level_2, ", ")
+end
+
 --- What is to be said of a reply's content: a list of { expert's name, words }.
 function M.complaints(id, frame)
   local list = {}
@@ -604,18 +630,9 @@ function M.complaints(id, frame)
         list[#list + 1] = { "cleared", "Cleared: " .. concat(cleared, ", ") }
       end
     end
-    local data = frame.raw:sub(5, 12)
-    if data ~= NO_FAULTS then
-      local names, _, severe = faults.read(frame.raw, 5)
-      if severe then
-        local level_2 = {}
-        for i = 1, #names do
-          if names[i]:sub(-8) == "_level_2" then
-            level_2[#level_2 + 1] = names[i]
-          end
-        end
-        list[#list + 1] = { "severe", "Level 2 fault: " .. concat(level_2, ", ") }
-      end
+    local severe = M.severe(frame.raw:sub(5, 12))
+    if severe then
+      list[#list + 1] = { "severe", severe }
     end
   elseif bursts.IDS[id] then
     local _, odd = burst_of(frame)

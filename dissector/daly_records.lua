@@ -179,6 +179,12 @@ local function gap_of(out, buf, base, first, last, cuts, known)
   gap(out, buf, base, first, last, cuts, known)
 end
 
+--- Whether a good Modbus window that begins at p is the Bluetooth module's own: function 10, register 0F05.
+function M.is_modules(buf, p)
+  local fn, high, low = byte(buf, p + 1, p + 3)
+  return fn == 0x10 and high == 0x0F and low == 0x05
+end
+
 --- A cutter for one stream.
 function M.new()
   return { buf = "", base = 1, scan = 1, cuts = {}, known = true, waiting = false }
@@ -208,7 +214,11 @@ function M.take(cutter, data, final)
       gap_of(out, buf, base, start, s - 1, cuts, known)
     end
     known = true
-    out[#out + 1] = { kind = "frame", first = base + s - 1, last = base + e - 1, dialect = dialect }
+    if dialect ~= "a5" and M.is_modules(buf, s) then
+      out[#out + 1] = { kind = "foreign", first = base + s - 1, last = base + e - 1, name = "Bluetooth module" }
+    else
+      out[#out + 1] = { kind = "frame", first = base + s - 1, last = base + e - 1, dialect = dialect }
+    end
     start, scan = e + 1, e + 1
   end
   if final and start <= n then

@@ -13,15 +13,17 @@
 --                                                              0x90: state of the newest 0x93; 0x98: data bytes of the
 --                                                              one before; 0x95, 0x96, texts: the burst (only base
 --                                                              and count, where the count is known), or { burst =,
---                                                              missing =, again =, table = } where there is more
+--                                                              missing =, again =, table = } where there is more;
+--                                                              Modbus: see daly_modbus_board
 --
 -- and there are three for what is rare:
 --
---   flag       "echo" or "retry"
+--   flag       "echo" or "retry"; "reply" where a Modbus frame's shape does not tell
 --   whole_in   first frame of a burst: packet that has the burst's table
 --   odd        { unasked =, late_to =, other_board =, second_host =, result =, cut_off =, changed = { names }, from =,
 --                contradictions = { name, packet, words, name, packet, words, ... } }, as in docs/records.md 7 to 11;
---              of a write also was =, was_in =: what it would change, as such a write's bytes, and the packet that told
+--              of a write also was =, was_in =: what it would change, as such a write's bytes (Modbus: two bytes, by
+--              register), and the packet that told; of Modbus ambiguous =, raised =, cleared = { names }
 
 local M = {}
 
@@ -51,6 +53,23 @@ function M.odd(results, slot)
     results.odd[slot] = odd
   end
   return odd
+end
+
+--- What a record says otherwise than another, in `packet`; in words for an expert note.
+function M.contradict(results, slot, name, packet, words)
+  local odd = M.odd(results, slot)
+  local list = odd.contradictions or {}
+  odd.contradictions = list
+  local n = #list
+  list[n + 1], list[n + 2], list[n + 3] = name, packet, words
+end
+
+--- What changed since the record in packet `from`; of several, the newest.
+function M.change(results, slot, name, from)
+  local odd = M.odd(results, slot)
+  odd.changed = odd.changed or {}
+  odd.changed[#odd.changed + 1] = name
+  odd.from = math.max(odd.from or 0, from)
 end
 
 --- Write something on an earlier frame's entry, in a way that can be taken back (daly_bus).

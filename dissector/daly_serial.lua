@@ -9,6 +9,7 @@ local streams = require("daly_streams")
 local records = require("daly_records")
 local second_look = require("daly_second_look")
 local view = require("daly_view")
+local windows = require("daly_windows")
 
 local M = {}
 
@@ -162,7 +163,10 @@ function M.dissect(buffer, pinfo, parent, handle)
     if blind then
       from, again = look_again(number, pinfo, raw)
     end
-    whole = from and from.plans[number] == nil and length == 13 and raw:byte() == 0xA5
+    whole = from
+      and from.plans[number] == nil
+      and from.results.link[number] ~= nil
+      and windows.fits(raw, length)
   end
 
   if whole then

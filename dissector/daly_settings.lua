@@ -11,6 +11,7 @@ local M = {}
 
 --- Names of values, by field.
 M.NAMES = {
+  state = { [0] = "stationary", [1] = "charging", [2] = "discharging" },
   battery_type = { [0] = "LFP", [1] = "ternary", [2] = "LTO" },
   operating_mode = { [1] = "long press", [2] = "short press" },
   inverter = {

@@ -14,6 +14,7 @@
 --   { part = number, at =, length = }   bytes of a record that ends in packet `number`
 
 local records = require("daly_records")
+local windows = require("daly_windows")
 local bus_module = require("daly_bus")
 local results_module = require("daly_results")
 
@@ -62,8 +63,17 @@ local function is_clear(raw, b, c, e, f, g, h, i, j, k, l, sum)
   return true
 end
 
+-- Whether a packet is one Modbus frame of a board and nothing else: no other frame begins in it and ends before it.
+local function is_one_modbus(raw, length)
+  local first, fn = byte(raw, 1, 2)
+  if first == INNER_A5 or not MODBUS_FUNCTIONS[fn] or windows.window(raw, 1, length) ~= length then
+    return false
+  end
+  return not find(raw, "\xA5..\8", 2) and not find(raw, INNER_MODBUS, 2) and not records.is_modules(raw, 1)
+end
+
 --- Everything known of one capture. `options`: baud; quiet, echo, reply, late, slow, burst, age in seconds; tolerances:
--- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance (%).
+-- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance, soc_tolerance (%).
 function M.capture(options)
   return {
     options = options,
@@ -184,13 +194,13 @@ local function feed(stream, frame)
   bus_module.feed(stream.bus, frame.slot, frame.number, frame.raw, frame.starts, frame.ends, stream.side, stream)
 end
 
--- Lay out records; returns the A5 frames among them, to be fed.
+-- Lay out records; returns the frames among them, to be fed.
 local function settle(capture, stream, found, list, held, held_base)
   local frames, byte_time = {}, capture.byte_time
   for i = 1, #found do
     local record = found[i]
     local item, from, to = lay_out(stream, record, list, held, held_base)
-    if record.dialect == "a5" then
+    if record.kind == "frame" then
       local known = stream.tentative and stream.tentative[record.first]
       item.slot = known and known.slot or new_slot(capture)
       frames[#frames + 1] = {
@@ -319,7 +329,7 @@ local function close(capture, stream)
 end
 
 --- One packet, in the order of the capture, once. `raw`: its bytes ("": an event). Returns true when it is one whole
--- A5 frame and nothing else, whose slot is then `number`; else look at M.plan.
+-- frame and nothing else, whose slot is then `number`; else look at M.plan.
 function M.first(capture, stream, number, time, raw)
   local length = #raw
   local cutter = stream.cutter
@@ -350,6 +360,11 @@ function M.first(capture, stream, number, time, raw)
       cutter.base = cutter.base + 13
       return true
     end
+  end
+  if cutter.buf == "" and is_one_modbus(raw, length) then
+    bus_module.feed(stream.bus, number, number, raw, time, ends, stream.side, stream)
+    cutter.base = cutter.base + length
+    return true
   end
   local first = cutter.base + #cutter.buf
   local plan = { open = stream }

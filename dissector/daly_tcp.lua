@@ -72,7 +72,7 @@ local function feed(items, raw, pinfo)
   local seen = {}
   for i = 1, #items do
     local item = items[i]
-    if item.kind == "frame" and item.dialect == "a5" then
+    if item.kind == "frame" then
       local bytes = raw:sub(item.at + 1, item.at + item.length)
       seen[bytes] = (seen[bytes] or 0) + 1
       local key = number .. " " .. seen[bytes] .. " " .. bytes

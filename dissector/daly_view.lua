@@ -3,6 +3,7 @@
 -- How records look: an item of the tree each, with its fields and expert notes, and the words of the columns.
 
 local field_module = require("daly_fields")
+local modbus_view = require("daly_modbus_view")
 local payload = require("daly_payload")
 local bursts = require("daly_bursts")
 local exchange = require("daly_exchange")
@@ -13,6 +14,8 @@ local M = {}
 
 local fields, experts = field_module.fields, field_module.experts
 local board_of = addresses.board
+
+local A5 = 0xA5
 
 local byte, format, concat = string.byte, string.format, table.concat
 
@@ -89,6 +92,30 @@ function out.cell(field, first, length, number, value)
     local item = add(tree, field, range(tvb, at + 4 + first, length))
     if visible then
       set_text(item, format("Cell %d: %d mV", number, value))
+    end
+  end
+end
+
+-- Registers as they are, numbered from `start` where that is known; in a branch that nobody needs to open.
+-- `value(place)`: one of them.
+function out.registers(field, first, count, start, value)
+  if not visible then
+    if referenced(tree, field) then
+      for place = 0, count - 1 do
+        add(tree, field, range(tvb, at + 4 + first + 2 * place, 2))
+      end
+    end
+    return
+  end
+  local branch = tree
+  if count > 1 then
+    branch = add(tree, range(tvb, at + 4 + first, 2 * count), format("%d registers", count))
+  end
+  for place = 0, count - 1 do
+    local item = add(branch, field, range(tvb, at + 4 + first + 2 * place, 2))
+    local raw = value(place)
+    if start then
+      set_text(item, format("Register %04X: %d (0x%04X)", start + place, raw, raw))
     end
   end
 end
@@ -396,24 +423,18 @@ local function a5(item, raw, slot)
   return text, source, destination
 end
 
-local function modbus(item, raw)
-  local address, fn = byte(raw, 1, 2)
-  local dialect = address == 0xD2 and "d2" or "81"
+-- What was odd about a Modbus frame, as notes and fields.
+function out.odd(item, odd, fn)
+  note_odd(item, odd, fn)
   if wanted then
-    local length = #raw
-    made(fields.dialect, dialect)
-    header(fields.modbus_address, 0, 1)
-    header(fields.modbus_function, 1, 1)
-    header(fields.undecoded, 2, length - 4)
-    if tree:referenced(fields.modbus_crc) then
-      tree:add_le(fields.modbus_crc, tvb(at + length - 2, 2))
-    end
-    made(fields.modbus_crc_status, 1)
+    show_odd(odd)
   end
-  if visible then
-    item:append_text(", Modbus RTU")
-  end
-  return format("Modbus %s  address 0x%02X  function 0x%02X  %d bytes", dialect:upper(), address, fn, #raw)
+end
+
+-- A Modbus frame, which may begin anywhere in the buffer.
+local function modbus(item, raw, slot)
+  at = at - 4 -- daly_view's data byte 0 is the frame's first byte
+  return modbus_view.show(item, raw, slot, results, wanted, again, out, slow)
 end
 
 local WORDS = {
@@ -492,7 +513,7 @@ local function one_record(parent, buffer, raw, item, number)
   if kind == "frame" and item.dialect == "a5" then
     text, source, destination = a5(node, raw, item.slot)
   elseif kind == "frame" then
-    text = modbus(node, raw)
+    text, source, destination = modbus(node, raw, item.slot)
   elseif kind == "event" then
     local comment = packet_comment()
     text = event_words(node, comment and tostring(comment.value) or "")
@@ -588,10 +609,16 @@ end
 
 M.out, M.hex_words, M.id_words, M.host_name, M.reply_words = out, hex_words, id_words, host_name, reply_words
 
---- A packet that is one whole A5 frame, which is the usual one.
+--- A packet that is one whole frame, which is the usual one.
 function M.whole(parent, buffer, raw, slot, pinfo)
-  local node = begin(parent, buffer, 0, 13, "frame")
-  local text, source, destination = a5(node, raw, slot)
+  local node = begin(parent, buffer, 0, #raw, "frame")
+  frame.table = nil
+  local text, source, destination
+  if byte(raw) == A5 then
+    text, source, destination = a5(node, raw, slot)
+  else
+    text, source, destination = modbus(node, raw, slot)
+  end
   local cols = pinfo.cols
   cols.protocol = "Daly"
   cols.info = text

@@ -160,6 +160,18 @@ local function modbus_lengths(buf, p, n)
   return dialect, 0
 end
 
+--- Whether these bytes have the shape of one frame, its check aside.
+function M.fits(raw, length)
+  local first, _, _, fourth = byte(raw, 1, 4)
+  if first == 0xA5 then
+    return length == 13 and fourth == 8
+  elseif length < 5 then
+    return false
+  end
+  local dialect, one, two, three = modbus_lengths(raw, 1, length)
+  return dialect ~= nil and (one == length or two == length or three == length)
+end
+
 --- The good window that begins at p and ends first, in buf[1..n].
 -- Returns its last position and its dialect ("a5", "d2", "81"), or nil, nil and whether one may still come: some form
 -- fits the bytes that are there and is cut off by n.

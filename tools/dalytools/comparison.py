@@ -26,7 +26,7 @@ from dalycapture.errors import CaptureError
 from dalycapture.linktype import DALY_LINK_TYPES, TAKEN_LINK_TYPE, link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
-from dalytools.field_names import FIELD_NAMES, SETTINGS
+from dalytools.field_names import FIELD_NAMES
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
 from dalytools.wire_times import preferences
@@ -44,7 +44,6 @@ _REST_KINDS = ("junk", "short")
 _UNDECODED = FIELD_NAMES.index("daly.undecoded")
 _KIND = FIELD_NAMES.index("daly.kind")
 _TRANSPORT = FIELD_NAMES.index("daly.transport")
-_DIALECT = FIELD_NAMES.index("daly.dialect")
 _LUA_ERROR, _EXPERT = "_ws.lua.error", "_ws.expert.message"
 _COLUMNS = len(FIELD_NAMES) + 3
 _TIMES = frozenset({"daly.response_time"})
@@ -397,12 +396,9 @@ def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Re
     _compare_rest(*rest, result)
     if any(len(side.open) > _MOST_REST for side in rest):
         _compare_open(number, rest, result)
-    known = _MODBUS_YET if not {"d2", "81"}.isdisjoint(map(str, told.get("daly.dialect", []))) else _COMPARED_YET
     for name in told.keys() - _KNOWN:
         result.add(Difference(number, name, "not a field of the dissector", str(told[name])))
     for name, values_seen in zip(FIELD_NAMES, seen, strict=True):
-        if name not in known:
-            continue
         expected = told.get(name, [])
         if len(values_seen) != len(expected) or not all(
             _same(name, one, other) for one, other in zip(values_seen, expected, strict=True)
@@ -418,21 +414,11 @@ def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Re
 
 
 _KNOWN = frozenset(FIELD_NAMES)
-# Data IDs beside those of the paper, and Modbus registers, are being taught to both readings, one after the other.
-# Until both know them, what only one of them has is not compared.
-_COMPARED_YET = frozenset(FIELD_NAMES) - {
-    *(f"daly.{name}" for name in SETTINGS.split()),
-    "daly.unknown_id",
-}
-_MODBUS_YET = frozenset(
-    f"daly.{name}"
-    for name in ["kind", "dialect", "modbus.address", "modbus.function", "modbus.crc", "modbus.crc.status"]
-)
 
 
 def _set_aside(number: int, seen: list[list[str]], rest: _Rest) -> None:
     """Take cut-off frames and junk out of the dissector's row, into ``rest``."""
-    kinds, undecoded, dialects = seen[_KIND], deque(seen[_UNDECODED]), deque(seen[_DIALECT])
+    kinds, undecoded = seen[_KIND], deque(seen[_UNDECODED])
     kept: list[str] = []
     kept_undecoded: list[str] = []
     for kind in kinds:
@@ -442,8 +428,7 @@ def _set_aside(number: int, seen: list[list[str]], rest: _Rest) -> None:
         kept.append(kind)
         if kind != "event":
             rest.close(number)
-        dialect = dialects.popleft() if kind in ("frame", "bad_checksum") and dialects else ""
-        if (kind == "foreign" or (kind == "frame" and dialect != "a5")) and undecoded:
+        if kind == "foreign" and undecoded:
             kept_undecoded.append(undecoded.popleft())
     seen[_TRANSPORT] = seen[_TRANSPORT][: len(kept)] if len(kept) < len(kinds) else seen[_TRANSPORT]
     seen[_KIND], seen[_UNDECODED] = kept, kept_undecoded + list(undecoded)

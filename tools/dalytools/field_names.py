@@ -43,7 +43,7 @@ current_module sum_voltage_detect short_circuit_protect low_volt_forbidden_chg
 mos_off_by_command charging_cabinet_offline
 """
 _FAULTS = "fault_code fault_count fault_raised fault_cleared"
-SETTINGS = """
+_SETTINGS = """
 setting.rated_capacity setting.cell_nominal_voltage setting.board_count setting.cells_1 setting.cells_2
 setting.cells_3 setting.sensors_1 setting.sensors_2 setting.sensors_3 total.charged total.discharged
 setting.battery_type setting.operating_mode production_date setting.sleep setting.current_drift firmware_index
@@ -87,7 +87,7 @@ FIELD_NAMES: tuple[str, ...] = tuple(
         *" ".join((_HEADER, _LINKS, _TROUBLE, _WRITES, _0X90, _0X91, _0X92, _0X93, _0X94)).split(),
         *" ".join((_0X95, _TABLE, _0X96, _SENSORS, _TEXTS, _0X97)).split(),
         *(f"fault.{name}" for name in _0X98.split()),
-        *" ".join((_FAULTS, _CHANGES, SETTINGS, _MODBUS, _CAN)).split(),
+        *" ".join((_FAULTS, _CHANGES, _SETTINGS, _MODBUS, _CAN)).split(),
         *(f"level.{name}" for name in _HKMS_LEVELS.split()),
         *(f"fault.{name}" for name in _HKMS_FAULTS.split()),
         *_REST.split(),

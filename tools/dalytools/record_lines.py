@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from dalyref import texts
 from dalyref.kinds import Kind
+from dalytools import modbus_lines
 from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
@@ -98,9 +99,7 @@ def line(record: Decoded) -> Line:
             kind, who, what, values, warnings = _hkms(record)
         case Kind.FRAME:
             kind = "modbus"
-            who = f"Modbus {record.data[0]:02X}"
-            what = f"function {record.data[1]:02X}"
-            values = _hex(record.data[2:-2])
+            who, what, values, warnings = modbus_lines.said(fields)
         case Kind.BAD_CHECKSUM:
             who, what = f"address {record.data[1]:02X}", f"{record.data[2]:02X} damaged"
             values, warnings = _hex(record.data[4:12]), f"checksum {record.data[12]:02X} is wrong"

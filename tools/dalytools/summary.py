@@ -56,7 +56,8 @@ class Summary:
         self._boards: dict[int, _BoardSeen] = {}
         self._asked: Counter[tuple[int, int]] = Counter()  # requests by address, ID
         self._unanswered: Counter[tuple[int, int]] = Counter()
-        self._echoes = self._retries = self._modbus = 0
+        self._echoes = self._retries = 0
+        self._modbus: Counter[str] = Counter()
         self._foreign: Counter[str] = Counter()
 
     def add(self, record: Decoded) -> None:
@@ -67,8 +68,12 @@ class Summary:
         if record.kind is Kind.FOREIGN:
             self._foreign[str(fields["daly.foreign"])] += 1
         direction = fields.get("daly.direction")
-        if direction is None:
-            self._modbus += record.kind is Kind.FRAME
+        if "daly.modbus.function" in fields:
+            self._modbus["reply" if direction == REPLY else "request"] += 1
+            self._modbus["unanswered"] += "daly.unanswered" in fields
+            self._modbus["exception"] += "daly.modbus.exception" in fields
+        elif direction is None:
+            return
         elif direction == REPLY and "daly.data_id" in fields:
             self._reply(fields)
         elif direction == ECHO:
@@ -100,7 +105,12 @@ class Summary:
         kinds = ", ".join(f"{count} {_kind_name(kind)}" for kind, count in self.kinds.most_common())
         out = [f"Records      {self.records}: {kinds}" if self.records else "Records      none"]
         if self._modbus:
-            out.append(f"Modbus       {counted(self._modbus, 'frame')} (their registers are not decoded yet)")
+            out.append(
+                f"Modbus       {counted(self._modbus['request'], 'request')}, "
+                f"{self._modbus['unanswered']} unanswered, "
+                f"{counted(self._modbus['reply'], 'reply', 'replies')}, "
+                f"{counted(self._modbus['exception'], 'exception')}"
+            )
         for name, count in self._foreign.items():
             out.append(f"Not Daly     {name}: {count}")
         out += self._requests()

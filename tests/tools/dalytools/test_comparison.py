@@ -171,7 +171,7 @@ ERRORS = {
         Difference(7, "daly.checksum.status", "1", "0"),
     ),
     "no board": (
-        (r"made\(fields\.board, board\)", "local _ = board"),
+        (r"(?<!out\.)made\(fields\.board, board\)", "local _ = board"),
         "real-poll-cycle.pcapng",
         Difference(25, "daly.board", "absent", "1"),
     ),

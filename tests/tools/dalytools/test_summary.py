@@ -54,7 +54,7 @@ def test_damage_and_other_traffic() -> None:
     shown = lines((0.0, ASK[:12] + b"\0"), (1.0, ASK[:9]), (2.0, b"\x11\x22"), (3.0, b""), (4.0, good))
     assert shown == [
         "Records      5: 1 bad checksum, 1 cut off, 1 junk, 1 event, 1 good",
-        "Modbus       1 frame (their registers are not decoded yet)",
+        "Modbus       1 request, 0 unanswered, 0 replies, 0 exceptions",
     ]
 
 
