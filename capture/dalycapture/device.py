@@ -60,6 +60,11 @@ class _Device:
     def counts(self) -> Counts | None:
         return self._line.counts(self._fd)
 
+    def retune(self, settings: Settings) -> None:
+        """Change speed and format; nothing else is touched. Raises PortError."""
+        rate = _rate(self.name, settings.baud)
+        _make_raw(self._fd, self.name, rate, settings, marked=self.facts.marked)
+
     def close(self) -> None:
         import fcntl
         import termios
@@ -75,12 +80,7 @@ class _Device:
 
 def open_device(name: str, settings: Settings, line: Line | None = None) -> Port:
     """Open a device to listen. Raises PortError."""
-    import termios
-
-    baud = settings.baud
-    rate: int | None = getattr(termios, f"B{baud}", None) if baud > 0 else None
-    if rate is None:
-        raise PortError(f"{name}: baud rate {baud} is not possible; Daly's is 9600, others are {COMMON_RATES}")
+    rate = _rate(name, settings.baud)
     line = line or KernelLine()
     try:
         mode = Path(name).stat().st_mode
@@ -95,6 +95,15 @@ def open_device(name: str, settings: Settings, line: Line | None = None) -> Port
     except BaseException:
         os.close(fd)
         raise
+
+
+def _rate(name: str, baud: int) -> int:
+    import termios
+
+    rate: int | None = getattr(termios, f"B{baud}", None) if baud > 0 else None
+    if rate is None:
+        raise PortError(f"{name}: baud rate {baud} is not possible; Daly's is 9600, others are {COMMON_RATES}")
+    return rate
 
 
 def _claim(fd: int, name: str) -> None:

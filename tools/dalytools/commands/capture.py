@@ -20,9 +20,10 @@ from dalycapture.writer import counted
 from dalytools import __version__, file_options
 from dalytools.adapter_list import list_adapters
 from dalytools.capture_summary import summary, write_statistics
+from dalytools.detection import detect_settings
 from dalytools.keys import Keys
 from dalytools.listening import Tap, add_listening_options, named, open_sides, taps_of
-from dalytools.port_options import checked
+from dalytools.port_options import checked, settings_of
 from dalytools.problem import Problem
 from dalytools.status_line import StatusLine
 
@@ -41,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "file (with -b). Exit status: 0 fine, 2 could not run, records were lost, or the port went away for good."
     )
     parser.add_argument("--list", action="store_true", help="list the serial adapters, without opening any, and end")
+    parser.add_argument(
+        "--detect",
+        action="store_true",
+        help="find the speed and format of PORT by listening (24 s at most where nothing is heard), and end",
+    )
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file; - is standard output")
     parser.add_argument(
         "-a",
@@ -82,6 +88,13 @@ def run(args: argparse.Namespace) -> int:
     taps = taps_of(args)
     if not taps:
         raise Problem("say which PORT to listen to; dalyshark capture --list shows what is there")
+    if args.detect:
+        if len(taps) != 1:
+            raise Problem("--detect listens to one PORT")
+        try:
+            return detect_settings(taps[0].port, settings_of(args))
+        except CaptureError as error:
+            raise Problem(str(error)) from None
     if not args.output:
         raise Problem("say where the capture goes: -w FILE, or -w - for standard output")
     limits, files = Limits(), None
