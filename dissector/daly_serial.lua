@@ -163,10 +163,7 @@ function M.dissect(buffer, pinfo, parent, handle)
     if blind then
       from, again = look_again(number, pinfo, raw)
     end
-    whole = from
-      and from.plans[number] == nil
-      and from.results.link[number] ~= nil
-      and windows.fits(raw, length)
+    whole = from and from.plans[number] == nil and from.results.link[number] ~= nil and windows.fits(raw, length)
   end
 
   if whole then
