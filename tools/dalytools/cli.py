@@ -31,6 +31,7 @@ COMMANDS = {
     "install": "dissector, profile and capture tool into Wireshark's personal folders",
     "uninstall": "take them away again",
     "doctor": "what is there, what is missing, and how to get it",
+    "selftest": "try one adapter with a jumper: the only command that transmits, and it asks",
     "simulate": "a bus with boards and a host on pseudo-terminals",
 }
 

@@ -106,7 +106,7 @@ def test_a_tshark_without_lua(script: str, why: str, monkeypatch: pytest.MonkeyP
     ("pattern", "replacement", "why"),
     [
         (r'created, daly = pcall\(Proto, "daly"', r"local \g<0>", "syntax error"),
-        (r'require\("daly_payload"\)', 'require("daly_none")', "not found"),
+        (r'require\("daly_stat"\)', 'require("daly_none")', "not found"),
         (r"function daly\.dissector\(.*\)", r'\g<0> error("on purpose")', "on purpose"),
     ],
 )
