@@ -29,7 +29,7 @@ from tests.capture.bus import Bus, numbered
 from dalycapture.create import open_writer
 from dalycapture.errors import TruncatedError
 from dalycapture.interface import tap
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.reader import read_capture
 from dalycapture.rotation import Keeping
 from dalycapture.sniffer import Limits, Side, Sniffer
@@ -44,7 +44,7 @@ SNIFF: Final = """
 import sys, time
 from dalycapture.create import open_writer
 from dalycapture.interface import tap
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.rotation import Keeping
 from dalycapture.sniffer import Side, Sniffer
 side = Side(open_port(sys.argv[1]), tap("x"))

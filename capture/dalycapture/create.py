@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from dalycapture.errors import CaptureError
-from dalycapture.output import open_output, open_pipe, reason, refuse_other_files
+from dalycapture.errors import CaptureError, reason
+from dalycapture.output import open_output, open_pipe, refuse_other_files
 from dalycapture.pcap import PcapWriter
 from dalycapture.pcapng import PcapngWriter
 from dalycapture.rotation import FileSeries, Keeping, Rotation

@@ -23,9 +23,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from dalycapture.adapters import adapter_of, serial_ports
-from dalycapture.errors import PortError
+from dalycapture.errors import PortError, reason
 from dalycapture.line import Counts, KernelLine, Line
-from dalycapture.output import reason
 from dalycapture.port import ASSUMED, PROMPT, READ_SIZE, Facts, Port, gone, latency_of
 
 if TYPE_CHECKING:

@@ -12,3 +12,9 @@ class PortError(CaptureError):
 
 class TruncatedError(CaptureError):
     """A capture file ends in the middle of a packet or block. All whole packets came before it."""
+
+
+def reason(error: OSError) -> str:
+    """Say what the system said, in lower case: ``no space left on device``."""
+    text = error.strerror or str(error)
+    return text[:1].lower() + text[1:]

@@ -16,13 +16,14 @@ import time
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
+from dalycapture.adapters import serial_ports
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
 from dalycapture.extcap import FILTERS, INTERFACE
 from dalycapture.interface import bus_name, tap_of
+from dalycapture.opening import open_port
 from dalycapture.output import PipeOutput
 from dalycapture.pcapng import PcapngWriter
-from dalycapture.port import open_port, serial_ports
 from dalycapture.rotation import Keeping
 from dalycapture.settings import Settings, line_format
 from dalycapture.sniffer import Side, Sniffer

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from dalycapture.checksum import checksum_path, write_checksum
 from dalycapture.disk import DiskThread
-from dalycapture.errors import CaptureError
+from dalycapture.errors import CaptureError, reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -392,9 +392,3 @@ def _is_appending(fd: int) -> bool:
     except ImportError:
         return True
     return bool(fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_APPEND)
-
-
-def reason(error: OSError) -> str:
-    """Say what the system said, in lower case: ``no space left on device``."""
-    text = error.strerror or str(error)
-    return text[:1].lower() + text[1:]

@@ -8,18 +8,17 @@ set it up). Windows goes through pyserial too.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
-from dalycapture.adapters import Adapter, serial_ports
 from dalycapture.errors import PortError
-from dalycapture.settings import DEFAULT_BAUD, Settings
 
 if TYPE_CHECKING:
-    from dalycapture.line import Counts, Line
+    from dalycapture.adapters import Adapter
+    from dalycapture.line import Counts
+    from dalycapture.settings import Settings
 
-__all__ = ["Facts", "Latency", "Port", "open_port", "serial_ports"]
+__all__ = ["Facts", "Latency", "Port"]
 
 READ_SIZE: Final = 4096  # the kernel's line discipline holds no more
 
@@ -82,23 +81,6 @@ class Port(Protocol):
     def close(self) -> None:
         """Close it."""
         ...
-
-
-def open_port(name: str, settings: Settings | int = DEFAULT_BAUD, *, line: Line | None = None) -> Port:
-    """Open a device (``/dev/ttyUSB0``), or a ``socket://`` or ``rfc2217://`` URL, to listen.
-
-    settings: or only the baud rate. line: answers for the driver (tests). Raises PortError, one line: not there, no
-    permission, in use, not a serial device, baud rate not possible.
-    """
-    if isinstance(settings, int):
-        settings = Settings(settings)
-    if "://" in name or os.name == "nt":
-        from dalycapture.remote import open_remote
-
-        return open_remote(name, settings)
-    from dalycapture.device import open_device
-
-    return open_device(name, settings, line)
 
 
 def gone(name: str, why: str = "") -> PortError:

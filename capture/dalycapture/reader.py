@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 from dalycapture import candump
 from dalycapture.btsnoop import MAGIC as _BTSNOOP
 from dalycapture.btsnoop import read_btsnoop
-from dalycapture.errors import CaptureError, TruncatedError
-from dalycapture.output import reason
+from dalycapture.errors import CaptureError, TruncatedError, reason
 from dalycapture.pcap import MICROSECONDS, NANOSECONDS, read_pcap
 from dalycapture.pcapng import read_pcapng
 from dalycapture.source import Source

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
 from dalycapture.adapters import Adapter, adapters
-from dalycapture.errors import PortError
-from dalycapture.output import reason
+from dalycapture.errors import PortError, reason
 from dalycapture.port import ASSUMED, NETWORK, READ_SIZE, Facts, Port, gone, latency_of
 
 if TYPE_CHECKING:

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Final
 
 from dalycapture.adapters import find_again
 from dalycapture.errors import PortError
-from dalycapture.port import Port, open_port
+from dalycapture.opening import open_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dalycapture.port import Port
     from dalycapture.settings import Settings
 
 LOOK_EVERY_S: Final = 0.02

@@ -20,14 +20,14 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final, Self
 
-from dalycapture.errors import CaptureError
-from dalycapture.output import Output, reason
+from dalycapture.errors import CaptureError, reason
 from dalycapture.rotation import FileSeries
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     from dalycapture.interface import Interface
+    from dalycapture.output import Output
     from dalycapture.torn import Whole
 
 STATISTICS_S: Final = 60.0

@@ -12,7 +12,7 @@ from tests.capture.uart import Line
 from dalycapture import detect
 from dalycapture.detect import SPEEDS, Trial, judge, trials
 from dalycapture.errors import PortError
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.settings import Settings
 from dalytools.cli import main
 

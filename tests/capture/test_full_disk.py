@@ -16,7 +16,7 @@ from tests.capture.bus import Bus, numbered
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
 from dalycapture.interface import tap
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.reader import read_capture
 from dalycapture.rotation import Keeping
 from dalycapture.sniffer import Limits, Side, Sniffer

@@ -24,7 +24,7 @@ SNIFF = """
 import sys
 from dalycapture.create import open_writer
 from dalycapture.interface import tap
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.sniffer import Side, Sniffer
 port = open_port(sys.argv[1])
 side = Side(port, tap("x"))

@@ -19,15 +19,18 @@ import pytest
 from tests.capture.bus import Bus
 
 from dalycapture import device as module
+from dalycapture.adapters import serial_ports
 from dalycapture.errors import CaptureError, PortError
 from dalycapture.interface import tap_of
 from dalycapture.line import Counts, KernelLine, ModemState
-from dalycapture.port import Port, open_port, serial_ports
+from dalycapture.opening import open_port
 from dalycapture.settings import ErrorMarks, Settings, line_format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from dalycapture.port import Port
 
 
 @pytest.fixture
@@ -137,7 +140,7 @@ def test_no_permission_names_the_group(bus: Bus, monkeypatch: pytest.MonkeyPatch
 
 def test_busy_names_who_has_it(bus: Bus) -> None:
     code = (
-        "import sys; from dalycapture.port import open_port\n"
+        "import sys; from dalycapture.opening import open_port\n"
         "port = open_port(sys.argv[1]); print('open', flush=True); sys.stdin.read(); port.close()"
     )
     other = subprocess.Popen([sys.executable, "-c", code, bus.port], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -210,7 +213,7 @@ def test_urls_that_are_none() -> None:
 
 def test_pyserial_is_not_imported_for_a_device(bus: Bus) -> None:
     code = (
-        "import sys; from dalycapture.port import open_port; open_port(sys.argv[1]).close()\n"
+        "import sys; from dalycapture.opening import open_port; open_port(sys.argv[1]).close()\n"
         "print(sorted({'serial', 'rich', 'scapy'} & set(sys.modules)))"
     )
     done = subprocess.run(

@@ -14,7 +14,7 @@ from tests.capture.test_sides import running, until
 from dalycapture.create import open_writer
 from dalycapture.errors import PortError
 from dalycapture.interface import tap
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.reader import read_capture
 from dalycapture.replug import can_come_back
 from dalycapture.settings import Settings

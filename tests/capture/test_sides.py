@@ -17,7 +17,8 @@ from dalycapture.clock import WallClock
 from dalycapture.create import open_writer
 from dalycapture.interface import tap
 from dalycapture.line import Counts
-from dalycapture.port import Facts, open_port
+from dalycapture.opening import open_port
+from dalycapture.port import Facts
 from dalycapture.reader import read_capture
 from dalycapture.side import Side
 from dalycapture.sniffer import Sniffer

@@ -16,9 +16,9 @@ from tests.capture.bus import Bus, numbered, real_uart_frames
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
 from dalycapture.interface import tap, tap_of
+from dalycapture.opening import open_port
 from dalycapture.output import PipeOutput
 from dalycapture.pcapng import PcapngWriter
-from dalycapture.port import open_port
 from dalycapture.reader import read_capture
 from dalycapture.settings import Settings
 from dalycapture.sniffer import End, Limits, Side, Sniffer, Tally

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dalycapture import detect
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalytools.problem import Problem
 from dalytools.terminal_text import plain
 

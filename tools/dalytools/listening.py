@@ -7,7 +7,7 @@ import argparse
 from typing import TYPE_CHECKING, NamedTuple
 
 from dalycapture.interface import tap_of
-from dalycapture.port import open_port
+from dalycapture.opening import open_port
 from dalycapture.side import DIRECTIONS, Side
 from dalytools.port_options import PORT_HELP, add_port_options, settings_of
 from dalytools.problem import Problem

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dalycapture.port import serial_ports
+from dalycapture.adapters import serial_ports
 from dalytools import __version__
 from dalytools.extcap_wrapper import answers
 from dalytools.installation import Installation, Step

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dalycapture.create import new_capture
-from dalycapture.errors import CaptureError
-from dalycapture.output import CAPTURE_MAGICS, reason
+from dalycapture.errors import CaptureError, reason
+from dalycapture.output import CAPTURE_MAGICS
 from dalycapture.reframe import Reframer
 from dalytools import __version__, wire_times
 from dalytools.logs.importer import Importer
