@@ -38,7 +38,7 @@ RULES: dict[str, Rule] = {
             "dissector-differs",
             _ERROR,
             "the Wireshark dissector and the reference decoder read a field differently",
-            "one of the two has a defect: report it with the capture (dalyshark redact makes it fit to be shared)",
+            "one of the two has a defect: report it with the capture",
         ),
         # Requests and replies (records.md 6, 7)
         (
@@ -171,7 +171,7 @@ RULES: dict[str, Rule] = {
             "unknown-id",
             _NOTE,
             "data IDs that no paper and no public program names",
-            "dalyshark survey helps to find out what they are; tell us",
+            "find out what they are, and tell us: docs/protocol.md lists what is known",
         ),
         (
             "other-dialect",
