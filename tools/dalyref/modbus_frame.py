@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from dalyref.values import Fields
 
 D2 = 0xD2
-BLUETOOTH_MODULE = 0x0F05
-"""The register that the Bluetooth module keeps for itself (docs/protocol.md, e)."""
 
 
 class Shape(Enum):
@@ -97,11 +95,6 @@ def parse(raw: bytes) -> ModbusFrame:
     return ModbusFrame(
         Shape.WRITE_MANY, address, function, first, second, content[4 + counted :], content[4] if counted else None
     )
-
-
-def is_module(raw: bytes) -> bool:
-    """Tell whether a good window is the Bluetooth module's own: no frame of a board."""
-    return raw[1] == modbus.WRITE_MANY and int.from_bytes(raw[2:4]) == BLUETOOTH_MODULE
 
 
 def describe(frame: ModbusFrame, fields: Fields) -> None:

@@ -30,7 +30,6 @@ from dalytools.field_names import FIELD_NAMES
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
 from dalytools.wire_times import preferences
-from dalytools.wires import choice as wires
 from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
@@ -115,13 +114,12 @@ def compare(
     path: Path,
     *,
     options: Options | None = None,
-    choice: wires.Choice | None = None,
     progress: Callable[[int], None] | None = None,
     listener: Listener | None = None,
 ) -> Comparison:
     """Compare both readings of a capture file.
 
-    options: the constants for both. choice: TCP ports and Bluetooth handles, for both. progress: called now and then
+    options: the constants for both. progress: called now and then
     with the number of packets compared. listener: is given all packets of the file, then all records of the reference.
     Raises Problem when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off
     is compared as far as it goes: ``broken``.
@@ -130,8 +128,7 @@ def compare(
     result = Comparison()
     serial = DALY_LINK_TYPES.intersection(_link_types(path, result, listener))
     options = options or Options()
-    choice = choice or wires.Choice()
-    arguments = [*preferences(options), *wires.preferences(choice)]
+    arguments = [*preferences(options)]
     if serial:
         arguments += ["-o", f"daly.link_types:{','.join(map(str, sorted(serial)))}"]
     arguments += [
@@ -145,7 +142,7 @@ def compare(
         arguments += ["-e", name]
     # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
     with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
-        _walk(rows, _Fed(path, choice, _Told(options, listener)), result, progress)
+        _walk(rows, _Fed(path, _Told(options, listener)), result, progress)
     told = any(difference.field == _LUA_ERROR for difference in result.differences)
     with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
         for row in rows:
@@ -159,7 +156,6 @@ def read_alone(
     path: Path,
     *,
     options: Options | None = None,
-    choice: wires.Choice | None = None,
     progress: Callable[[int], None] | None = None,
     listener: Listener,
 ) -> Comparison:
@@ -167,7 +163,7 @@ def read_alone(
     _refuse_pipes(path)
     result = Comparison()
     _link_types(path, result, listener)
-    decoder, carriers = _Told(options or Options(), listener), Carriers(choice)
+    decoder, carriers = _Told(options or Options(), listener), Carriers()
     for packet in _packets(path):
         if _is_ours(packet):
             result.packets += 1
@@ -292,14 +288,14 @@ def _packets(path: Path) -> Iterator[Packet]:
 class _Fed:
     """The reference's reading of a file, which goes on as far as it is asked to."""
 
-    def __init__(self, path: Path, choice: wires.Choice, decoder: _Told) -> None:
+    def __init__(self, path: Path, decoder: _Told) -> None:
         self.ready: deque[Decoded] = deque()
         self.streams: dict[int, Key] = {}
         """Of packets with something for the decoder, not yet compared: the stream it went to."""
         self.expected: deque[int] = deque()
         """Packets that tshark has to show."""
         self._packets = _packets(path)
-        self._carriers = Carriers(choice)
+        self._carriers = Carriers()
         self._decoder = decoder
         self._ended = False
 

@@ -19,6 +19,7 @@ _TOLERANCES = (
     ("cell_tolerance", "mV", "0x91 and the cells of 0x95 may differ by so much"),
     ("temperature_tolerance", "C", "0x92 and the sensors of 0x96 may differ by so much"),
     ("sum_tolerance", "%%", "the pack voltage and the sum of the cells may differ by so much"),
+    ("soc_tolerance", "%%", "the SOC over A5 and over Modbus may differ by so much"),
 )
 
 

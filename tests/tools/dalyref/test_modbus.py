@@ -35,6 +35,15 @@ def test_papers_and_field(frame: str, dialect: Dialect) -> None:
     assert [(record.data, record.kind, record.dialect) for record in split(data)] == [(data, Kind.FRAME, dialect)]
 
 
+def test_the_bluetooth_modules_own_is_no_frame_of_a_board() -> None:
+    """Field notes e: 81 10 0F05, which the module answers as 51 10 0F05 AAAA."""
+    asked = bytes.fromhex("81100f05000200000000876a")
+    answered = bytes.fromhex("51100f05aaaa")
+    answered += modbus.crc(answered).to_bytes(2, "little")
+    for data in (asked, answered):
+        assert [(one.data, one.kind, one.foreign) for one in split(data)] == [(data, Kind.FOREIGN, "Bluetooth module")]
+
+
 @pytest.mark.parametrize("row", SINGLE, ids=lambda row: row["id"])
 def test_real_modbus(row: real.Row) -> None:
     data = bytes.fromhex(row["hex"])

@@ -365,7 +365,10 @@ def test_a_tshark_that_dies_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("link_type", "says"),
     [
-        (105, "its link type is 105 (IEEE 802.11); a Daly bus is captured as 147 (USER0) to 162 (USER15), SocketCAN, "),
+        (
+            105,
+            "its link type is 105 (IEEE 802.11); what is read is a serial line, as 147 (USER0) to 162 (USER15)",
+        ),
         (149, "its link type is 149 (USER2)"),
     ],
 )

@@ -28,7 +28,6 @@ from dalytools.progress import progress_bar
 from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -87,7 +86,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--github", action="store_true", help="findings as annotations of GitHub Actions")
     parser.add_argument("--no-colour", "--no-color", action="store_true", help="as NO_COLOR=1 does")
     wire_times.add_arguments(parser, quiet="--silence")
-    choice.add_arguments(parser)
 
 
 def _limit(text: str) -> float:
@@ -105,7 +103,6 @@ class _Asked:
     """What to check by: command line over configuration over defaults."""
 
     options: Options
-    choice: choice.Choice
     limits: Limits
     severity: dict[str, Severity]
     ignored: frozenset[str]
@@ -122,7 +119,6 @@ class _Asked:
         fail_on: str = args.fail_on or settings.fail_on or str(Severity.ERROR)
         return cls(
             wire_times.read(args, base),
-            choice.read(args),
             limits,
             settings.severity,
             frozenset((*settings.ignore, *args.ignore)),
@@ -202,16 +198,13 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
     try:
         with progress_bar(f"check {plain(Path(name).name)}") as advance:
             if tshark is None:
-                result = read_alone(
-                    Path(name), options=asked.options, choice=asked.choice, progress=advance, listener=search
-                )
+                result = read_alone(Path(name), options=asked.options, progress=advance, listener=search)
             else:
                 listener = search if asked.rules else None
                 result = compare(
                     tshark,
                     Path(name),
                     options=asked.options,
-                    choice=asked.choice,
                     progress=advance,
                     listener=listener,
                 )

@@ -20,7 +20,6 @@ from dalytools.progress import progress_bar
 from dalytools.record_lines import line
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
 from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
@@ -55,7 +54,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
     wire_times.add_arguments(parser)
-    choice.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -63,7 +61,6 @@ def run(args: argparse.Namespace) -> int:
     files: list[str] = args.files
     output: str = args.output
     options = wire_times.read(args)
-    chosen = choice.read(args)
     if output != "-":
         for name in files:
             if name != "-" and os.path.realpath(name) == os.path.realpath(output):
@@ -74,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         shown = 0
         for name in files:
             said = len(problems)
-            shown += _decode_file(name, options, chosen, put, problems)
+            shown += _decode_file(name, options, put, problems)
             out.flush()
             for problem in problems[said:]:
                 print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
@@ -86,13 +83,12 @@ def run(args: argparse.Namespace) -> int:
 def _decode_file(
     name: str,
     options: Options,
-    chosen: choice.Choice,
     put: Callable[[str, Decoded], None],
     problems: list[str],
 ) -> int:
     """Put every record of one file out; return how many, and append what is wrong with the file to `problems`."""
     decoder = Decoder(options)
-    carriers = Carriers(chosen)
+    carriers = Carriers()
     shown = 0
     others: set[int] = set()
     packets = passed = 0

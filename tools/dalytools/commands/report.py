@@ -20,7 +20,6 @@ from dalytools.report.collect import Collected
 from dalytools.report.page import page
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
 from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
@@ -37,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT.html", required=True, help="page to write")
     parser.add_argument("--title", help="heading of the page (the files' names)")
     wire_times.add_arguments(parser)
-    choice.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(name: str, args: argparse.Namespace, collected: Collected, search: Search, problems: list[str]) -> None:
     """Read one file; what is wrong with it is appended to `problems`."""
-    decoder, carriers = Decoder(wire_times.read(args)), Carriers(choice.read(args))
+    decoder, carriers = Decoder(wire_times.read(args)), Carriers()
 
     def take(records: list[Decoded]) -> None:
         for record in records:

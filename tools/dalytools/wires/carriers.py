@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which reader takes a packet, by its link type (docs/wires.md, the table at its head).
-
-What carries Bluetooth and TCP is loaded when the first such packet comes: it needs scapy, an extra
-(``pip install dalyshark[wires]``), which a Raspberry Pi that only captures can do without.
-"""
+"""Which reader takes a packet, by its link type (docs/wires.md). Bluetooth and TCP have none yet."""
 
 from __future__ import annotations
 
@@ -11,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 from dalyref.packet import SERIAL_LINK_TYPES
 from dalytools.wires import can
-from dalytools.wires.choice import Choice
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,9 +18,6 @@ SOCKETCAN: Final = 227
 
 class Carriers:
     """Takes the packets of one capture, in order."""
-
-    def __init__(self, choice: Choice | None = None) -> None:
-        self._choice = choice or Choice()
 
     def of(self, packet: Packet) -> Sequence[Packet]:
         """Return what a packet holds for the decoder: nothing where it can't be Daly's."""
@@ -45,5 +37,5 @@ class Carriers:
         return link_type in SERIAL_LINK_TYPES or link_type == SOCKETCAN
 
 
-NOT_READ: Final = "a Daly bus is captured as 147 (USER0) to 162 (USER15), SocketCAN, Bluetooth HCI or TCP"
+NOT_READ: Final = "what is read is a serial line, as 147 (USER0) to 162 (USER15), and CAN, as SocketCAN"
 """Said of a file with nothing but other link types."""
