@@ -161,7 +161,7 @@ class PcapngWriter(CaptureWriter):
 
 
 @dataclass(slots=True)
-class _Side:
+class Side:
     """An interface as read."""
 
     number: int  # over the whole file
@@ -175,23 +175,28 @@ class _Side:
     offset_s: int = 0
 
     def nanoseconds(self, ticks: int) -> int:
+        """Return a time stamp in ns since 1970 UTC."""
         power = self.resolution & 0x7F
         scaled = ticks * 1_000_000_000
         return (scaled >> power if self.resolution & 0x80 else scaled // 10**power) + self.offset_s * 1_000_000_000
 
 
-class _Reader:
-    """State of reading: the section's byte order and interfaces, and the count of packets over the file."""
+class PcapngReader:
+    """State of reading: the section's byte order and interfaces, and the count of packets over the file.
+
+    Who reads most blocks otherwise gives the others to it: as another ``source``, with the ``number`` counted so far.
+    """
 
     def __init__(self, source: Source, told: Told) -> None:
         self.source = source
         self.told = told
         self.order = "<"
-        self.sides: list[_Side] = []
+        self.sides: list[Side] = []
         self.interfaces = 0
         self.number = 0
 
     def packets(self) -> Iterator[CapturedPacket]:
+        """Yield the packets of the blocks of ``source``; see ``read_pcapng``."""
         while head := self._read(8, at_start=True):
             if head[:4] == b"\x0a\x0d\x0d\x0a":
                 self._section(head)
@@ -269,7 +274,7 @@ class _Reader:
         if len(body) < 8:
             raise self._damaged("an interface description that is too short")
         link_type, _, snap_length = struct.unpack_from(self.order + "HHI", body)
-        side = _Side(self.interfaces, link_type, snap_length)
+        side = Side(self.interfaces, link_type, snap_length)
         for code, value in self._options(body, 8):
             if code == IF_NAME:
                 side.name = _decoded(value)
@@ -301,7 +306,7 @@ class _Reader:
         codes = (ISB_START, ISB_END, ISB_RECEIVED, ISB_DROPPED, ISB_OS_DROPPED)
         self.told.statistics(Statistics(side.number, *(values.get(code) for code in codes)))
 
-    def _side(self, interface: int) -> _Side:
+    def _side(self, interface: int) -> Side:
         if interface >= len(self.sides):
             raise self._damaged(f"a packet of interface {interface}, which is not described")
         return self.sides[interface]
@@ -336,7 +341,7 @@ class _Reader:
             link_type=side.link_type,
         )
 
-    def _made(self, side: _Side, ticks: int, body: bytes, captured: int) -> CapturedPacket:
+    def _made(self, side: Side, ticks: int, body: bytes, captured: int) -> CapturedPacket:
         end = 20 + captured
         if end > len(body):
             raise self._damaged("a packet longer than its block")
@@ -378,4 +383,4 @@ def read_pcapng(source: Source, told: Told | None = None) -> Iterator[CapturedPa
     Raises CaptureError where the file is damaged, TruncatedError where it ends in the middle of a block; what was whole
     before that point has been yielded.
     """
-    return _Reader(source, told or Told()).packets()
+    return PcapngReader(source, told or Told()).packets()

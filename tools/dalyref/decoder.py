@@ -9,7 +9,6 @@ Memory is bounded whatever the capture holds: see the limits below.
 
 from __future__ import annotations
 
-import heapq
 import re
 from collections import deque
 from dataclasses import dataclass, field
@@ -17,11 +16,12 @@ from typing import TYPE_CHECKING
 
 from dalyref.bus import Bus
 from dalyref.can_bus import CanBus, Meaning
+from dalyref.file_order import LATE_NS, MOST_HELD, MOST_STREAMS, FileOrder
 from dalyref.kinds import Dialect, Kind
 from dalyref.message import from_serial
 from dalyref.options import NANO, Options
 from dalyref.packet import SERIAL_LINK_TYPES, CanFrame
-from dalyref.streams import Located, Stream
+from dalyref.streams import Located
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -33,17 +33,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Decoded", "Decoder", "Options", "decode"]
 
-# Packets of several interfaces are not strictly in the order of their times. Whether something has been given up by
-# time is therefore decided a little later than the rule would have it.
+# Whether something on a bus has been given up by time is decided a little later than the rule would have it: see
+# LATE_NS, and this where the bus itself tells the time.
 _LATE_ON_BUS_NS = NANO // 2
-_LATE_ELSEWHERE_NS = 10 * NANO
-# What a hostile capture may make the decoder hold.
-_MOST_HELD = 65536
-_MOST_WAITING_STREAMS = 64
-_MOST_STREAMS = 4096
-
-_StreamKey = tuple[int | str, str]
-"""Interface, or connection; and direction."""
 
 _BUS_NAME = re.compile(r"bus=([^\s,;]+)")
 
@@ -81,13 +73,10 @@ class Decoder:
 
     def __init__(self, options: Options | None = None) -> None:
         self._options = options or Options()
-        self._streams: dict[_StreamKey, Stream] = {}
-        self._waiting: dict[_StreamKey, Stream] = {}  # those that hold bytes
+        self._order = FileOrder[_Recognised](self._options)
         self._buses: dict[tuple[Transport, int | str], Bus] = {}
         self._bus_of: dict[int, tuple[str, Bus]] = {}  # by serial interface: its description, its bus
         self._can_buses: dict[int, CanBus] = {}  # by interface
-        self._ordered: list[tuple[int, int, Located | _Recognised]] = []  # heap by packet number and place
-        self._place = 0
         self._held: deque[tuple[Decoded, Slate | None]] = deque()
         self._now_ns = 0
         self._latest_ns = 0  # beginning of the latest packet
@@ -104,82 +93,32 @@ class Decoder:
             return []
         if serial or packet.data:
             self._latest_ns = max(self._latest_ns, packet.time_ns)
-        key = (packet.interface if serial else packet.connection, packet.direction)
-        stream = self._streams.get(key)
-        if stream is None:
-            stream = self._new_stream(key, packet.transport)
-        self._order(stream.feed(packet))
-        if serial and not packet.data:
-            self._order((Located(None, packet, packet.time_ns, packet.time_ns),))
-        if stream.waits_from is not None:
-            self._waiting[key] = stream
-        else:
-            self._waiting.pop(key, None)
-        if len(self._waiting) > (key in self._waiting) or len(self._ordered) > _MOST_HELD:
-            self._give_up(key, packet.time_ns)
-        self._release()
+        self._order.feed(packet)
+        self._decode_all(self._order.released())
         return self._final()
 
     def finish(self) -> list[Decoded]:
         """Take the end of the file; return all that was held."""
-        for stream in self._waiting.values():
-            self._order(stream.flush())
-        self._waiting.clear()
-        self._release()
+        self._decode_all(self._order.finish())
         return self._final(everything=True)
 
     def _feed_can(self, frame: CanFrame) -> list[Decoded]:
         """Take a CAN frame: it is a record by itself, or not ours."""
         bus = self._can_buses.get(frame.interface)
         if bus is None:
-            if len(self._can_buses) >= _MOST_STREAMS:
+            if len(self._can_buses) >= MOST_STREAMS:
                 self._can_buses.clear()
             bus = self._can_buses[frame.interface] = CanBus(self._options)
         recognised = bus.recognise(frame)
         if recognised is None:
             return []
         self._latest_ns = max(self._latest_ns, frame.time_ns)
-        self._place += 1
-        heapq.heappush(self._ordered, (frame.number, self._place, _Recognised(frame, bus, *recognised)))
-        if len(self._ordered) > _MOST_HELD:
-            self._give_up(None, frame.time_ns)
-        self._release()
+        self._order.put(frame.number, frame.time_ns, _Recognised(frame, bus, *recognised))
+        self._decode_all(self._order.released())
         return self._final()
 
-    def _new_stream(self, key: _StreamKey, transport: Transport) -> Stream:
-        if len(self._streams) >= _MOST_STREAMS:
-            oldest = next(iter(self._streams))
-            self._waiting.pop(oldest, None)
-            self._order(self._streams.pop(oldest).flush())
-        stream = self._streams[key] = Stream(self._options, transport)
-        return stream
-
-    def _order(self, located: Iterable[Located]) -> None:
-        for item in located:
-            self._place += 1
-            heapq.heappush(self._ordered, (item.packet.number, self._place, item))
-
-    def _give_up(self, present: _StreamKey | None, time_ns: int) -> None:
-        """Flush streams that have been silent for long, so that they do not hold up the others."""
-        late = [
-            key
-            for key, stream in self._waiting.items()
-            if key != present and stream.silent_at(time_ns, _LATE_ELSEWHERE_NS)
-        ]
-        if len(self._waiting) - len(late) > _MOST_WAITING_STREAMS or len(self._ordered) > _MOST_HELD:
-            late += [key for key in self._waiting if key not in late][:1]
-        for key in late:
-            self._order(self._waiting.pop(key).flush())
-
-    def _release(self) -> None:
-        """Decode what no record still to come can precede."""
-        ordered = self._ordered
-        if not self._waiting:
-            barrier = None
-        else:
-            barrier = min(number for stream in self._waiting.values() if (number := stream.waits_from) is not None)
-        while ordered and (barrier is None or ordered[0][0] <= barrier):
-            item = heapq.heappop(ordered)[2]
+    def _decode_all(self, items: Iterable[Located | _Recognised]) -> None:
+        for item in items:
             if isinstance(item, _Recognised):
                 self._decode_can(item)
             else:
@@ -199,7 +138,7 @@ class Decoder:
     def _bus_named(self, key: tuple[Transport, int | str]) -> Bus:
         bus = self._buses.get(key)
         if bus is None:
-            if len(self._buses) >= _MOST_STREAMS:
+            if len(self._buses) >= MOST_STREAMS:
                 self._buses.clear()
                 self._bus_of.clear()
             bus = self._buses[key] = Bus(self._options)
@@ -263,8 +202,8 @@ class Decoder:
                 if not (
                     everything
                     or slate.bus.now_ns > late_ns + _LATE_ON_BUS_NS
-                    or self._now_ns > late_ns + _LATE_ELSEWHERE_NS
-                    or len(held) > _MOST_HELD
+                    or self._now_ns > late_ns + LATE_NS
+                    or len(held) > MOST_HELD
                 ):
                     break
                 slate.bus.settle(slate, self._latest_ns)

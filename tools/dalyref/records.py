@@ -136,6 +136,11 @@ class Splitter:
         self._data = self._data + data if self._data else bytes(data)
         return self._advance(closed=False)
 
+    def passed(self, count: int) -> None:
+        """Take note of `count` bytes, whole frames, that were cut elsewhere while nothing was held."""
+        self._base += count
+        self._gap.shift(count)
+
     def event(self) -> None:
         """Note that an event lies at the present position: junk and foreign records end there, frames do not."""
         if self._data:

@@ -90,6 +90,12 @@ class Stream:
             out += self._locate(records)
         return out
 
+    def passed(self, count: int, end_ns: int) -> None:
+        """Take note of `count` bytes, whole frames up to `end_ns`, that were cut elsewhere while nothing was held."""
+        self._length += count
+        self._end_ns = end_ns
+        self._splitter.passed(count)
+
     def flush(self) -> list[Located]:
         """Silence or the end: return what is held."""
         return self._locate(self._splitter.flush())
