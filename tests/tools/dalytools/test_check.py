@@ -88,10 +88,10 @@ def test_a_cut_off_file_is_compared_and_is_status_2(tmp_path: Path, capsys: pyte
     cut.write_bytes(CYCLE.read_bytes()[:-60])
     assert main(["check", str(cut), str(CYCLE)]) == 2
     shown = capsys.readouterr()
-    first, second, _ = shown.out.splitlines()
+    first, second, *_ = (line for line in shown.out.splitlines() if " records (" in line)
     records = int(first.removeprefix(f"{cut}: ").split()[0])
     assert 20 <= records <= 25
-    assert first.endswith(f"({records} frame): 0 differences")
+    assert f"({records} frame): 0 differences" in first
     assert second.startswith(f"{CYCLE}: 25 records")
     assert shown.err.startswith(f"dalyshark check: {cut}: cut off in the middle of a block at byte ")
     assert shown.err.endswith("; compared what is there\n")

@@ -242,7 +242,8 @@ def _show(checked: Checked, asked: _Asked, to: Console, *, quiet: bool) -> None:
     if quiet and not shown:
         return
     kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(checked.kinds.items(), key=lambda item: -item[1]))
-    head = f"{plain(checked.file)}: {counted(checked.records, 'record')} ({kinds}): {verdict([checked])}"
+    kinds = f" ({kinds})" if kinds else ""
+    head = f"{plain(checked.file)}: {counted(checked.records, 'record')}{kinds}: {verdict([checked])}"
     to.print(head, soft_wrap=True)
     for line in checked.listed:
         to.print(f"  {plain(line)}", soft_wrap=True)

@@ -7,7 +7,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dalyref import addresses
+from dalyref import addresses, can_foreign
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
 from dalytools.findings.limits import SILENT_AFTER
@@ -24,6 +24,13 @@ if TYPE_CHECKING:
 
 _DIALECTS = {"a5": "A5 (UART/485)", "d2": "Modbus D2", "81": "Modbus 81", "hkms": "HKMS CAN"}
 _REMEMBERED = 1024  # requests
+_INVERTERS = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV))
+_SINOWEALTH = "Sinowealth"
+_MODBUS = "Modbus"
+_SOMETIMES = (
+    "answered at other times: look for damaged bytes and other hosts at these packets, and for requests that come too "
+    "fast (few boards answer any closer than 60 ms)"
+)
 
 
 @dataclass(slots=True)
@@ -77,10 +84,13 @@ class Requests(Watch):
         self._dialects: dict[tuple[str, str], _Dialect] = {}
         self._given_up: OrderedDict[int, _Line] = OrderedDict()  # packet of an unanswered request: its line
         self._last: dict[tuple[str, bytes], Decoded] = {}  # the newest request with these bytes, for its echo
+        self._foreign: set[str] = set()  # whose other traffic is there
 
     def record(self, record: Decoded, bus: str) -> None:
         """Count a request or an echo; of replies only their dialect."""
         direction = record.fields.get("daly.direction")
+        if record.kind is Kind.FOREIGN and len(self._foreign) < 16:
+            self._foreign.add(str(record.fields.get("daly.foreign", "")))
         if record.kind is not Kind.FRAME or direction is None:
             return
         key = bus, str(record.fields.get("daly.dialect", ""))
@@ -141,7 +151,8 @@ class Requests(Watch):
             if asked.unanswered.count:
                 retried = f" ({counted(asked.retries, 'retry', 'retries')} among them)" if asked.retries else ""
                 text = f"{asked.unanswered.count} of {counted(asked.asked, 'request')}{retried} got no reply in time"
-                yield found("unanswered", place, asked.unanswered, text)
+                advice = _SOMETIMES if asked.answered else ""
+                yield found("unanswered", place, asked.unanswered, text, advice=advice)
         for place, hosts in self._hosts.items():
             if hosts.seconds.count:
                 names = " and ".join(_host_name(name) for name in sorted(hosts.names))
@@ -171,9 +182,23 @@ class Requests(Watch):
     def _silence(self, place: Place) -> str:
         """Advise on an address that nobody answers (field notes, fact 3 and g.1)."""
         heard = [other for other, line in self._lines.items() if line.answered and other != place]
+        if heard and all(other.detail != place.detail for other in heard):
+            names = " and ".join(dict.fromkeys(_speaks(other) for other in heard))
+            return f"a board on this bus answers in {names}, and in nothing else: set the client to that dialect"
+        heard = [other for other in heard if other.detail == place.detail]
         if heard:
             names = ", ".join(map(str, heard[:4]))
             return f"{names} answers: ask that, or give the board the number that is asked"
+        if self._foreign & _INVERTERS:
+            return (
+                "an inverter's protocol is on the bus, which the pack sends by itself: in such a mode a board answers "
+                "no polls. Read those frames, or set the board's CAN to Daly's own protocol (250 kbit/s)"
+            )
+        if _SINOWEALTH in self._foreign:
+            return (
+                "somebody on this bus talks with a Sinowealth board, which does not know Daly's protocol: if it is "
+                "this pack, use a program for Sinowealth boards"
+            )
         if place.data_id is None and (place.board or 0) > 1:
             return (
                 f"is there a board with the number {place.board}? Board 1 answers 0x40; check its power and wiring too"
@@ -206,8 +231,15 @@ def _line(record: Decoded, bus: str) -> Place:
     address = address_of(record.fields)
     modbus = "daly.modbus.address" in record.fields
     if modbus and address is not None:
-        return Place(bus, address=address, detail="Modbus")
+        return Place(bus, address=address, detail=_MODBUS)
     return Place(bus, board) if board is not None else Place(bus, address=address)
+
+
+def _speaks(place: Place) -> str:
+    """Name the dialect that is spoken there."""
+    if place.detail != _MODBUS:
+        return _DIALECTS["a5"]
+    return _DIALECTS["d2" if place.address == 0xD2 else "81"]
 
 
 def _host_name(host: int) -> str:

@@ -51,7 +51,7 @@ RULES: dict[str, Rule] = {
             "unanswered",
             _WARNING,
             "requests for an ID or a register got no reply in time",
-            "a board does not answer IDs that it does not know, and few boards answer requests closer than 60 ms",
+            "a board does not answer IDs that it does not know, and says nothing of it: see whether it answers others",
         ),
         (
             "unasked",
@@ -140,6 +140,31 @@ RULES: dict[str, Rule] = {
             "a fault bit was set from the first fault reply on",
             "the fault is older than the capture: look at the battery",
         ),
+        # What is right, and easily read wrongly
+        (
+            "current-sign",
+            _NOTE,
+            "what the sign of the current means on this board: it is not the same on all of them",
+            "set the client's sign for this board, or take the direction from 0x93, which says it in words",
+        ),
+        (
+            "stale-slots",
+            _NOTE,
+            "frames of cells hold old bytes behind the last cell, which a client may take for more cells",
+            "a client must take the number of cells from 0x94, and drop what is behind",
+        ),
+        (
+            "absent-registers",
+            _NOTE,
+            "registers were read that the board does not have: it answers FFFF, not with an exception",
+            "drop them, or read them in the board's other dialect: the maps of D2 and 81 differ",
+        ),
+        (
+            "read-short",
+            _NOTE,
+            "a program reads too few registers for all that a D2 board reports",
+            "read 80 registers (0000 x 0050); a Bluetooth module hardly brings more at once",
+        ),
         # Writes (records.md 10)
         ("write", _NOTE, "a request that changes something was seen", "make sure that you know who sent it"),
         (
@@ -154,6 +179,18 @@ RULES: dict[str, Rule] = {
             "a write got no reply",
             "read the value back before relying on it",
         ),
+        (
+            "write-no-switch",
+            _WARNING,
+            "a write went to a register that holds a reading: it is echoed, and changes nothing",
+            "write the register that is the setting: D2 00A5 charge MOS, 00A6 discharge MOS, 00A7 SOC; 81 0121, 0122",
+        ),
+        (
+            "write-no-effect",
+            _WARNING,
+            "a board confirmed that it switched a MOS, and went on saying that it is as before",
+            "the echo does not prove that a value was taken: read back; a protection may hold the MOS open",
+        ),
         # What else is on the wire
         (
             "damaged",
@@ -166,6 +203,12 @@ RULES: dict[str, Rule] = {
             _WARNING,
             "traffic of another protocol is on the bus",
             "take the other device off the bus, or use the program that is made for it",
+        ),
+        (
+            "not-polled",
+            _WARNING,
+            "frames are on the CAN bus, and nobody asks a board of Daly's: such a board speaks only when it is asked",
+            "start the program that asks; compare bit rates: 250 kbit/s for Daly's own dialect, 500 for most inverters",
         ),
         (
             "unknown-id",
@@ -195,7 +238,7 @@ RULES: dict[str, Rule] = {
         (
             "line-errors",
             _WARNING,
-            "the adapter saw framing errors, parity errors or breaks",
+            "the adapter saw framing errors, parity errors or breaks; on CAN, the controller sent error frames",
             "check baud rate, ground and termination; see whether two devices speak at once",
         ),
         (

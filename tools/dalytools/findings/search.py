@@ -7,7 +7,10 @@ import re
 from typing import TYPE_CHECKING
 
 from dalytools.findings.answers import Answers
+from dalytools.findings.can_ids import CanIds
+from dalytools.findings.effects import Effects
 from dalytools.findings.limits import Limits
+from dalytools.findings.misread import Misread
 from dalytools.findings.replies import Replies
 from dalytools.findings.requests import Requests
 from dalytools.findings.values import Values
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 
 _BUS_NAME = re.compile(r"bus=([^\s,;]+)")  # docs/records.md 5
 _MOST_INTERFACES = 4096
+_FOLLOWS = frozenset(("unanswered", "write-unconfirmed"))
+"""They say ID by ID what another finding of the same severity may say once."""
 
 
 class Search:
@@ -39,7 +44,10 @@ class Search:
             Replies(limits),
             Answers(),
             Values(),
+            Misread(),
             Written(),
+            Effects(),
+            CanIds(),
             Wire(limits),
         )
 
@@ -60,6 +68,14 @@ class Search:
             watch.record(record, bus)
 
     def findings(self) -> list[Finding]:
-        """Return what was found: the worst first, then in the order of the capture."""
+        """Return what was found: the worst first, a cause before what follows from it, then in the capture's order."""
         out = [finding for watch in self._watches for finding in watch.findings()]
-        return sorted(out, key=lambda finding: (-finding.severity, finding.tally.first_packet, finding.rule))
+        return sorted(
+            out,
+            key=lambda finding: (
+                -finding.severity,
+                finding.rule in _FOLLOWS,
+                finding.tally.first_packet,
+                finding.rule,
+            ),
+        )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalycapture.captured import CapturedPacket
+from dalyref import can_foreign
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Severity, Tally
 from dalytools.findings.place import Place
@@ -34,6 +35,8 @@ _EVENTS = (
 )
 """How the sniffer's events begin (dalycapture.sniffer), and the rule each breaks."""
 _MOST_SAID = 200
+_CAN = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV, can_foreign.DEYE, can_foreign.AMBIGUOUS))
+_ON_CAN = "a pack may send an inverter's frames by itself: a client must tell them from Daly's by their identifiers"
 _EXAMPLES = 3
 
 
@@ -143,7 +146,8 @@ class Wire(Watch):
                 severity = Severity.WARNING if share > self._limit else Severity.NOTE
                 yield found("damaged", place, line.tally, text, severity=severity)
         for place, tally in self._foreign.items():
-            yield found("foreign", place, tally, f"{counted(tally.count, 'record')} of {place.detail}")
+            advice = _ON_CAN if place.detail in _CAN else ""
+            yield found("foreign", place, tally, f"{counted(tally.count, 'record')} of {place.detail}", advice=advice)
         for rule, event in self._events.items():
             text = f"{counted(event.tally.count, 'time')}"
             yield found(rule, Place(), event.tally, text, examples=tuple(event.said))

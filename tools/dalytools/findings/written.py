@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
-from dalytools.findings.place import ECHO, place_of
+from dalytools.findings.place import ECHO, number, place_of, words
 from dalytools.findings.rules import found
 from dalytools.findings.watch import Groups, Watch
 from dalytools.terminal_text import counted
@@ -21,9 +22,12 @@ if TYPE_CHECKING:
     from dalytools.findings.finding import Finding
 
 _MOST_SHOWN = 5
+_REMEMBERED = 256  # requests
 _MOST_TEXT = 100
-_SHOWN = ("daly.setting.", "daly.command", "daly.clock", "daly.production_date", "daly.modbus.value")
+_SHOWN = ("daly.setting.", "daly.command", "daly.clock", "daly.production_date")
 """What a write sets; a password is not among them."""
+_MOS = {"daly.setting.mos_charge": "charge MOS", "daly.setting.mos_discharge": "discharge MOS"}
+_SOC = "daly.setting.soc"
 
 
 @dataclass(slots=True)
@@ -33,12 +37,19 @@ class _Write:
     what: dict[str, None] = field(default_factory=dict[str, None])
 
 
+@dataclass(slots=True)
+class _Denied:
+    tally: Tally = field(default_factory=Tally)
+    said: dict[str, None] = field(default_factory=dict[str, None])
+
+
 class Written(Watch):
     """Follows writes by board and ID or register."""
 
     def __init__(self) -> None:
         self._writes = Groups(_Write)
-        self._denied = Groups(Tally)
+        self._asked: OrderedDict[int, str] = OrderedDict()  # a write's packet: what it sets
+        self._denied = Groups(_Denied)
         self._exceptions = Groups(Tally)
         self._ambiguous = Groups(Tally)
 
@@ -50,12 +61,19 @@ class Written(Watch):
         if "daly.write" in fields and fields.get("daly.direction") != ECHO:
             write = self._writes[place_of(record, bus)]
             write.tally.add(record.number, record.time_ns)
+            what = self._asked[record.number] = _what(record)
+            if len(self._asked) > _REMEMBERED:
+                self._asked.popitem(last=False)
             if len(write.what) < _MOST_SHOWN:
-                write.what[_what(record)] = None
+                write.what[what] = None
             if "daly.unanswered" in fields:
                 write.unanswered.add(record.number, record.time_ns)
         if fields.get("daly.write_result") == "denied":
-            self._denied[place_of(record, bus)].add(record.number, record.time_ns)
+            denied = self._denied[place_of(record, bus)]
+            denied.tally.add(record.number, record.time_ns)
+            asked = self._asked.get(number(fields, "daly.request_in") or 0, "")
+            if asked and len(denied.said) < _MOST_SHOWN:
+                denied.said[f"asked: {asked}, the board says: {_what(record)}"] = None
         if "daly.modbus.exception" in fields:
             code = f"exception {fields['daly.modbus.exception']}"
             self._exceptions[place_of(record, bus, code)].add(record.number, record.time_ns)
@@ -69,8 +87,9 @@ class Written(Watch):
             if write.unanswered.count:
                 text = f"{write.unanswered.count} of {counted(write.tally.count, 'write')} got no reply"
                 yield found("write-unconfirmed", place, write.unanswered, text)
-        for place, tally in self._denied.items():
-            yield found("write-denied", place, tally, f"{counted(tally.count, 'write')} answered with something else")
+        for place, denied in self._denied.items():
+            text = f"{counted(denied.tally.count, 'write')} answered with something else; {'; '.join(denied.said)}"
+            yield found("write-denied", place, denied.tally, text.removesuffix("; "))
         for place, tally in self._exceptions.items():
             yield found("modbus-exception", place, tally, f"{counted(tally.count, 'exception')}")
         for place, tally in self._ambiguous.items():
@@ -79,19 +98,23 @@ class Written(Watch):
 
 
 def _what(record: Decoded) -> str:
-    """Say what a write sets, by the field names; else its bytes. Of a password only that it is one."""
+    """Say what a write sets, or its reply says, by field names; else its bytes. Of a password only that it is one."""
     if "daly.password" in record.fields:
         return "a password"
     named = _named(record.fields)
     if named:
         return ", ".join(named)[:_MOST_TEXT]
+    if "daly.modbus.value" in record.fields:
+        return f"value {', '.join(words(record.fields, 'daly.modbus.value'))}"[:_MOST_TEXT]
     data = str(record.fields.get("daly.data", ""))
     return f"data {data}" if data else f"{len(record.data)} bytes"
 
 
 def _named(fields: Fields) -> list[str]:
-    return [
-        f"{name.removeprefix('daly.').removeprefix('setting.')} {value}"
-        for name, value in fields.items()
-        if name.startswith(_SHOWN)
-    ]
+    return [_said(name, value) for name, value in fields.items() if name.startswith(_SHOWN)]
+
+
+def _said(name: str, value: object) -> str:
+    if name in _MOS:
+        return f"{_MOS[name]} {'on' if value else 'off'}"
+    return f"SOC {value} %" if name == _SOC else f"{name.removeprefix('daly.').removeprefix('setting.')} {value}"

@@ -224,7 +224,7 @@ class SimulatedBoard:
             if taken:
                 self._set_clock(payload[:6])
                 self.battery.set_soc(int.from_bytes(payload[6:8]))
-            return [bytes((taken,)) + self._reserved(self._behind_switch)]
+            return [bytes((taken or habits.writes == "pretend",)) + self._reserved(self._behind_switch)]
         if data_id == RESTART:
             if habits.writes == "accept":
                 self.silent_until_s = self.now_s + RESTART_S
@@ -233,7 +233,7 @@ class SimulatedBoard:
             if habits.writes == "accept" and not self._zero_left:
                 settings.take(data_id + WRITE_OFFSET, payload)
                 return [payload]
-            return [settings.payload(data_id + WRITE_OFFSET) or _NOTHING]
+            return [payload if habits.writes == "pretend" else settings.payload(data_id + WRITE_OFFSET) or _NOTHING]
         if data_id in TEXT_FRAMES:
             return settings.text_payloads(data_id, habits.frame_base)
         if data_id == 0x52:
@@ -315,6 +315,8 @@ class SimulatedBoard:
                 for place, value in enumerate(request.values):
                     self._write_register(dialect, request.register + place, value)
                 self._write_clock(dialect, request)
+                values = list(request.values)
+            elif habits.writes == "pretend":
                 values = list(request.values)
             else:
                 old = self.registers(dialect).get(request.register, ABSENT)
@@ -444,6 +446,8 @@ class SimulatedBoard:
                 self.battery.charge_mos = bool(value)
             self.battery.refresh()
         state = self.battery.discharge_mos if data_id == 0xD9 else self.battery.charge_mos
+        if value in {0, 1} and self.board.habits.writes == "pretend":
+            state = bool(value)
         return bytes((state,)) + self._reserved(self._behind_switch)
 
 

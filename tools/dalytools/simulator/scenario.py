@@ -24,7 +24,7 @@ from dalytools.simulator.faults import FAULT_BITS
 from dalytools.simulator.settings import Texts
 
 Dialect = Literal["a5", "d2", "81"]
-Writes = Literal["accept", "ignore", "silent"]
+Writes = Literal["accept", "ignore", "pretend", "silent"]
 Lie = Literal[
     "pack_voltage", "cell_max", "cell_min", "cell_number", "temperature_max", "temperature_min", "sensor_number", "soc"
 ]
@@ -107,7 +107,7 @@ class Habits:
     jitter_ms: float = 1.5
     echo_ms: float = 4.0  # a sleeping board gives the request back after
     zero_replies: int = 10  # replies that are all zero after waking up (field notes b, sleep)
-    writes: Writes = "accept"  # ignore: answered with the old state; silent: not answered
+    writes: Writes = "accept"  # ignore: answered with the old state; pretend: as if taken; silent: not answered
     unanswered: tuple[int, ...] = ()  # data IDs that this firmware does not know
     alarm_grid: bool = False  # whether it answers 70 to 8A (field notes a.2: one source; another board is silent)
 

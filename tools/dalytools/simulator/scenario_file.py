@@ -164,7 +164,7 @@ def _board(table: Table) -> Board:
         jitter_ms=table.number("jitter_ms", default.jitter_ms, 0, 60_000),
         echo_ms=table.number("echo_ms", default.echo_ms, 0, 60_000),
         zero_replies=table.integer("zero_replies", 10, 0, 1000),
-        writes=table.word("writes", "accept", ("accept", "ignore", "silent")),  # pyright: ignore[reportArgumentType]
+        writes=table.word("writes", "accept", ("accept", "ignore", "pretend", "silent")),  # pyright: ignore[reportArgumentType]
         unanswered=table.integers("unanswered", (), 0, 255, shown=_DATA_IDS),
         alarm_grid=table.flag("alarm_grid", default=False),
     )

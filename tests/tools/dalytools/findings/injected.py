@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tests.meaning import a5, cells, extremes, status
+from tests.meaning_modbus import brings, read
 
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
@@ -79,12 +80,23 @@ def poll(at: float) -> list[Heard]:
     ]
 
 
+def discharging(at: float, current: int) -> list[Heard]:
+    """A pack of 16 cells under load (field notes, a.90: dpy-S1 has state 2 and raw 30500)."""
+    return [
+        *asked(at, 0x93, a5(1, 0x93, "020101")),
+        *asked(at + 0.3, 0x90, a5(1, 0x90, f"020c0000{current:04x}0181")),
+    ]
+
+
 CLEAN = [heard for second in range(3) for heard in poll(second)]
 LATER = [Heard(20, a5(0x40, 0x61)), Heard(20.05, a5(1, 0x61, "1801020304050607"))]
 """An exchange long after, so that what came before is settled."""
 FAULTY, FINE = a5(1, 0x98, "0100000000000000"), a5(1, 0x98)
 FOREIGN = "010300000001840a"
 """Modbus of slave 1: reads register 0; its CRC as every Modbus primer has it."""
+
+SWITCH_000C = "d206000c00019baa"
+"""The vendor's example: a write of 1 to 000C, and its CRC."""
 
 CASES: dict[str, list[Heard]] = {
     "silent": [heard for second in range(3) for heard in asked(2 * second, 0x90, host=0x41)],
@@ -116,6 +128,20 @@ CASES: dict[str, list[Heard]] = {
     "damaged": [*CLEAN, Heard(5, "00112233445566778899aabbccdd"), *asked(6, 0x90, PACK)],
     "foreign": [*CLEAN, Heard(5, FOREIGN), *asked(6, 0x90, PACK)],
     "unknown-id": [*CLEAN, *asked(5, 0xC1, a5(1, 0xC1))],
+    "current-sign": [heard for second in range(3) for heard in discharging(second, 30500)],
+    "stale-slots": [
+        *asked(0, 0x94, status(4)),
+        *asked(1, 0x95, cells(1, 3300, 3310, 3300), cells(2, 3290, 3301, 3302)),
+    ],
+    "absent-registers": [Heard(0, read(0x63, 2)), Heard(0.05, brings(0xFFFF, 0xFFFF))],
+    "read-short": [Heard(0, read(0, 0x3E)), Heard(0.05, brings(*[3300] * 4, *[0] * 36, 132, 30000, 500, *[0] * 19))],
+    "write-no-switch": [*CLEAN, Heard(5, SWITCH_000C), Heard(5.05, SWITCH_000C)],
+    "write-no-effect": [
+        *CLEAN,
+        Heard(5, MOS_OFF),
+        Heard(5.05, a5(1, 0xD9, "00")),
+        *asked(8, 0x93, a5(1, 0x93, "000101")),
+    ],
     "port-lost": [*CLEAN, Heard(5, comment="port lost: the adapter was unplugged")],
     "line-errors": [*CLEAN, Heard(5, comment="line errors: 2 bytes marked, driver counts framing errors 2")],
     "dropped": [*CLEAN, Heard(5, a5(0x40, 0x61), dropped=4), Heard(5.05, a5(1, 0x61))],
@@ -128,6 +154,8 @@ BESIDES: dict[str, set[str]] = {
     "asleep": {"echo", "unanswered"},
     "clock-step": {"late", "unanswered"},
     "write-denied": {"write"},
+    "write-no-switch": {"write"},
+    "write-no-effect": {"write"},
     "write-unconfirmed": {"write", "unanswered"},
 }
 """What the same capture breaks too: a silent board's requests are unanswered, and the like."""

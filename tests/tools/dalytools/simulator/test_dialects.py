@@ -160,6 +160,19 @@ def test_boards_that_do_not_take_writes(writes: str, answered: bool) -> None:
     assert a5(simulated, 0x93)[0][1] == 1
 
 
+def test_a_board_that_pretends_answers_as_if_it_took_the_write() -> None:
+    simulated = board(writes="pretend")
+    off = modbus.write_request(0xD2, 0xA5, [0])
+    limit = bytes.fromhex("0e100e740af00a8c")
+    assert a5(simulated, 0xDA, bytes(8))[0][0] == 0
+    assert asked(simulated, off) == off
+    assert a5(simulated, 0x21, bytes(6) + (800).to_bytes(2))[0][0] == 1
+    assert a5(simulated, 0x19, limit) == [limit]
+    assert a5(simulated, 0x93)[0][1] == 1  # charge MOS on, as before
+    assert words(simulated, 0xD2, 0x2A, 1) != [800]
+    assert a5(simulated, 0x59) != [limit]
+
+
 def test_alarm_grid_is_a_habit() -> None:
     """ID = 70 + 9 x (level - 1) + class; class 2 is currents, discharge first (field notes a.2)."""
     assert board().answer(frame(0x40, 0x70, bytes(8))) is None
