@@ -64,7 +64,8 @@ class _Socket:
 def measure(_options: Options) -> list[Result]:
     """Pull it out twenty times, for half a second to two."""
     result = Result(f"Adapter pulled out and put in again, {TIMES} times", ("what", "median, ms", "worst, ms"))
-    lost_s, back_ns = [], []
+    lost_s: list[float] = []
+    back_ns: list[int] = []
     with tempfile.TemporaryDirectory(prefix="dalyshark-bench-") as folder:
         path = Path(folder) / "sniffed.pcapng"
         socket = _Socket(Path(folder) / "usb-adapter")
@@ -92,7 +93,8 @@ def measure(_options: Options) -> list[Result]:
             socket.unplug()
         packets = list(read_capture(path))
     first_ms = [
-        min(packet.time_ns - moment for packet in packets if len(packet.data) == SIZE and packet.time_ns >= moment) / 1e6
+        min(packet.time_ns - moment for packet in packets if len(packet.data) == SIZE and packet.time_ns >= moment)
+        / 1e6
         for moment in back_ns
     ]
     told = [float(found[1]) for packet in packets if (found := BACK.match(packet.comment))]
