@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tests.tools.dalytools.survey.planted import Bus
@@ -23,9 +24,7 @@ def compared(tmp_path: Path, before: dict[int, Payload], after: dict[int, Payloa
     captures: list[str] = []
     for name, seed, payloads in (("a", 1, before), ("b", 2, after)):
         bus = Bus(polls, seed)
-        replies = {
-            data_id: lambda poll, payload=payload, bus=bus: payload(bus, poll) for data_id, payload in payloads.items()
-        }
+        replies = {data_id: partial(payload, bus) for data_id, payload in payloads.items()}
         captures.append(str(bus.write(tmp_path / f"{name}.pcapng", replies)))
     out = tmp_path / "difference.json"
     assert main(["survey", "--diff", *captures, "--json", str(out), "--direction", "reply", "--id", "E0-EF"]) == 0
@@ -50,7 +49,9 @@ def test_a_setting_of_two_bytes(tmp_path: Path) -> None:
 
 
 def test_one_bit(tmp_path: Path) -> None:
-    found = compared(tmp_path, {0xE0: lambda *_: b"\x81" + bytes(7)}, {0xE0: lambda *_: b"\x89" + bytes(7)})
+    found = compared(
+        tmp_path, {0xE0: lambda _bus, _poll: b"\x81" + bytes(7)}, {0xE0: lambda _bus, _poll: b"\x89" + bytes(7)}
+    )
     assert changes(found) == [("value", 0, 0, "81 before, 89 now (bit 3)")]
 
 
@@ -90,13 +91,17 @@ def test_another_range(tmp_path: Path) -> None:
 
 def test_a_state_that_came_once_and_stayed(tmp_path: Path) -> None:
     found = compared(
-        tmp_path, {0xE0: lambda *_: bytes(8)}, {0xE0: lambda _, poll: bytes((2 if poll >= 150 else 0, *bytes(7)))}
+        tmp_path,
+        {0xE0: lambda _bus, _poll: bytes(8)},
+        {0xE0: lambda _, poll: bytes((2 if poll >= 150 else 0, *bytes(7)))},
     )
     assert changes(found) == [("also", 0, 0, "always 00 before, now 02 too (50 of 200 times)")]
 
 
 def test_seen_too_seldom_to_be_sure(tmp_path: Path) -> None:
-    found = compared(tmp_path, {0xE0: lambda *_: bytes(8)}, {0xE0: lambda *_: b"\1" + bytes(7)}, polls=3)
+    found = compared(
+        tmp_path, {0xE0: lambda _bus, _poll: bytes(8)}, {0xE0: lambda _bus, _poll: b"\1" + bytes(7)}, polls=3
+    )
     assert changes(found) == [
         ("few", 0, 0, "00 before, 01 now (bit 0), but seen 3 and 3 times only: it may move anyway")
     ]

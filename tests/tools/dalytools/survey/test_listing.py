@@ -16,7 +16,7 @@ from tests.tools.dalytools.survey.planted import Bus
 from dalytools.cli import main
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
 
@@ -34,7 +34,7 @@ def listed(words: Sequence[str], **environment: str) -> str:
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bus = Bus(60)
-    replies = {
+    replies: dict[int, Callable[[int], bytes]] = {
         0xE0: lambda poll: bytes((poll, *bus.noise(3), 0, 0, 0, 0)),
         0x93: lambda _: bytes((0, 1, 1, 9, 0, 0, 1, 2)),
     }

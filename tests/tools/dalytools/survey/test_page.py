@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tests.tools.dalytools.made import EPOCH_NS, a5
@@ -51,10 +52,10 @@ def test_text_of_a_capture_stays_text(tmp_path: Path) -> None:
 
 
 def test_a_difference_is_a_page_too(tmp_path: Path) -> None:
+    def still(value: int, _: int) -> bytes:
+        return bytes((value, *bytes(7)))
+
     page = tmp_path / "difference.html"
-    captures = [
-        str(Bus(30).write(tmp_path / f"{value}.pcapng", {0xE0: lambda _, value=value: bytes((value, *bytes(7)))}))
-        for value in (1, 2)
-    ]
+    captures = [str(Bus(30).write(tmp_path / f"{value}.pcapng", {0xE0: partial(still, value)})) for value in (1, 2)]
     assert main(["survey", "--diff", *captures, "-o", str(page)]) == 0
     assert "01 before, 02 now (bits 0, 1)" in browse(page, tmp_path)
