@@ -5,7 +5,7 @@
 --
 --   A5 frame    A5 | address | data ID | 08 | d0 d1 d2 d3 d4 d5 d6 d7 | sum          paper Daly UART/485 V1.2
 --
---   packets --daly_serial, daly_tcp, daly_can--> records --daly_bus--> their meaning --daly_view--> tree, columns
+--   packets --daly_serial, daly_tcp, daly_can, daly_ble--> records --daly_bus--> meaning --daly_view--> tree, columns
 --
 -- Runs in Lua 5.2 (Wireshark 4.0, 4.2) to 5.4 (4.4, 4.6).
 
@@ -30,6 +30,7 @@ local view = require("daly_view")
 local serial = require("daly_serial")
 local tcp = require("daly_tcp")
 local can = require("daly_can")
+local ble = require("daly_ble")
 require("daly_stat").register()
 require("daly_hexlog").register()
 
@@ -45,6 +46,7 @@ daly.experts = expert_list
 
 local FIRST_DLT, LAST_DLT, PKTAP_DLT = 147, 162, 149
 local LAST_PORT = 65535
+local LAST_HANDLE = 65535
 
 local prefs = daly.prefs
 prefs.link_types = Pref.range(
@@ -64,6 +66,12 @@ prefs.can = Pref.bool(
   "Look for Daly frames on CAN",
   true,
   "Take CAN frames with Daly's identifiers for Daly's; off: only where you choose Daly for CAN (Decode As)"
+)
+prefs.ble_handles = Pref.range(
+  "Bluetooth handles",
+  "",
+  "Handles of attributes that are a board's, where the capture does not hold their discovery; old dongles: 15,17,48",
+  LAST_HANDLE
 )
 prefs.modbus = Pref.bool(
   "Recognise Modbus frames",
@@ -116,6 +124,7 @@ local function begin()
   serial.init(options)
   tcp.init(options)
   can.init(options, prefs.can)
+  ble.init(options, prefs.ble_handles)
 end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
@@ -124,8 +133,9 @@ local handle
 
 function daly.dissector(buffer, pinfo, parent)
   handle = handle or Dissector.get("daly")
-  if pinfo.port_type ~= NO_PORTS then
-    return tcp.dissect(buffer, pinfo, parent, handle)
+  local ports = pinfo.port_type
+  if ports ~= NO_PORTS then
+    return (ports == ble.PORT_TYPE and ble or tcp).dissect(buffer, pinfo, parent, handle)
   elseif can.brought(buffer, pinfo.match_uint) then
     return can.dissect(buffer, pinfo, parent, handle)
   end
@@ -202,6 +212,7 @@ end
 
 claim()
 can.setup(daly)
+ble.setup(daly)
 tcp_ports:add_for_decode_as(daly)
 DissectorTable.get("rtacser.data"):add_for_decode_as(daly)
 

@@ -328,6 +328,23 @@ local function close(capture, stream)
   end
 end
 
+--- What comes next does not follow what came before: as after silence.
+function M.divide(capture, stream)
+  close(capture, stream)
+end
+
+--- Whether the stream ends in what may still become a frame.
+function M.is_open(stream)
+  return stream.cutter.scan <= #stream.cutter.buf
+end
+
+--- Bytes that are a foreign record by themselves, and no part of the stream; they divide it as an event does.
+function M.aside(capture, stream, number, time, raw, name)
+  capture.results.latest = math.max(capture.results.latest, time)
+  records.event(stream.cutter)
+  capture.plans[number] = { items = { { kind = "foreign", name = name, at = 0, length = #raw } } }
+end
+
 --- One packet, in the order of the capture, once. `raw`: its bytes ("": an event). Returns true when it is one whole
 -- frame and nothing else, whose slot is then `number`; else look at M.plan.
 function M.first(capture, stream, number, time, raw)
