@@ -28,12 +28,13 @@ def open_writer(
     *,
     application: str = "dalyshark",
     keeping: Keeping | None = None,
+    about_machine: bool = True,
 ) -> CaptureWriter:
     """Make a capture file; ``-`` is standard output. An older capture of that name is overwritten, nothing else is.
 
     Its header is written with the first interface.
-    application: name and version of the program, for the file; keeping: in what form files are kept. Raises
-    CaptureError.
+    application: name and version of the program, for the file; keeping: in what form files are kept; about_machine:
+    say on what hardware and system it was made. Raises CaptureError.
     """
     keeping = keeping or Keeping()
     output = _output(path, file_format, keeping)
@@ -42,8 +43,8 @@ def open_writer(
     return PcapngWriter(
         output,
         application=application,
-        hardware=platform.machine(),
-        os_name=f"{platform.system()} {platform.release()}",
+        hardware=platform.machine() if about_machine else "",
+        os_name=f"{platform.system()} {platform.release()}" if about_machine else "",
         wait_when_full=keeping.wait_when_full,
     )
 

@@ -44,7 +44,7 @@ def _modbus_lengths(data: bytes, at: int, end: int) -> list[int]:
     return []
 
 
-def _modbus_step(data: bytes, at: int, end: int) -> int:
+def modbus_step(data: bytes, at: int, end: int) -> int:
     """Return where the frame at `at` ends, _MAYBE where bytes are missing, _DEAD where there is none."""
     if modbus.asks(data[at]) or modbus.answers(data[at]):
         return _DEAD
@@ -69,7 +69,7 @@ def _asks(data: bytes, at: int, end: int) -> bool:
     )
 
 
-def _sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
+def sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
     """Return where the exchange at `at` ends: behind the reply, or behind the request when what follows is none."""
     if not _asks(data, at, end):
         return _DEAD
@@ -112,7 +112,7 @@ class Run:
     def _walk(data: bytes, start: int, end: int, done: int, *, ended: bool, sinowealth: bool) -> int:
         while 0 <= done < end - start:
             at = start + done
-            step = _sinowealth_step(data, at, end, ended=ended) if sinowealth else _modbus_step(data, at, end)
+            step = sinowealth_step(data, at, end, ended=ended) if sinowealth else modbus_step(data, at, end)
             if step == _MAYBE:
                 return _DEAD if ended else done
             done = step - start if step >= 0 else _DEAD

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Copies of the codes, numbers and passwords of a capture, wherever they stand: forward, backward, in swapped pairs.
+
+What was learned is found again by any six bytes of it in a row (all of it, where it is shorter; from four on), so that
+a part is found too. What is left of it in fewer bytes is for ``stale``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+WINDOW: Final = 6
+SHORTEST: Final = 4
+_MOST_WINDOWS: Final = 1 << 17
+_MOST_VALUES: Final = 4096
+_PADDING: Final = b"\x00\xff\x20"
+
+
+class Copies:
+    """What a capture has of codes, numbers and passwords."""
+
+    def __init__(self) -> None:
+        self.values: dict[bytes, None] = {}
+        """Each whole, without padding at its ends."""
+        self._windows: dict[int, set[bytes]] = {}
+        self._count = 0
+
+    def learn(self, raw: bytes) -> None:
+        """Remember a value, or a part of one."""
+        value = raw.strip(_PADDING)
+        if len(value) < SHORTEST or value in self.values:
+            return
+        if len(self.values) < _MOST_VALUES:
+            self.values[value] = None
+        for shape in shapes(value):
+            size = min(WINDOW, len(shape))
+            windows = self._windows.setdefault(size, set())
+            for at in range(len(shape) - size + 1):
+                window = shape[at : at + size]
+                if window.strip(_PADDING) and self._count < _MOST_WINDOWS:
+                    self._count += window not in windows
+                    windows.add(window)
+
+    def find(self, data: bytes) -> Iterator[tuple[int, int]]:
+        """Yield (start, stop) of each place where a copy stands; places may overlap."""
+        for size, windows in self._windows.items():
+            for at in range(len(data) - size + 1):
+                if data[at : at + size] in windows:
+                    yield at, at + size
+
+
+def shapes(value: bytes) -> set[bytes]:
+    """Return a value as boards of all dialects send it: in order, backward; the bytes of words swapped."""
+    found: set[bytes] = set()
+    for whole in (value, value[::-1]):
+        found.add(whole)
+        for start in (0, 1):
+            found.add(whole[:start] + _swapped(whole[start:]))
+    return found
+
+
+def _swapped(data: bytes) -> bytes:
+    """Swap the bytes of each whole pair."""
+    out = bytearray(data)
+    even = len(out) // 2 * 2
+    out[0:even:2], out[1:even:2] = out[1:even:2], out[0:even:2]
+    return bytes(out)

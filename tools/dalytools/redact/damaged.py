@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Bytes that belong to no good frame: blanked, but for what says that they are damaged, and how.
+
+bad_checksum   A5 addr id 08 | eight bytes, blanked | a sum that is as wrong as it was
+short          the head of the frame that it began; the rest blanked
+junk           blanked; 00 and FF stay
+foreign        the frames of other protocols keep their shape, and their check bytes are made right again
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+from dalyref import a5, bluetooth_module, foreign, modbus
+from dalyref.kinds import Kind
+from dalytools.redact import a5_layout, modbus_data
+from dalytools.redact.what import DATES, TEXTS, What
+
+if TYPE_CHECKING:
+    from dalyref.kinds import Record
+    from dalytools.redact.blanker import Blanker
+
+_HEAD: Final = 4
+_MODBUS_HEADS: Final = {modbus.READ: 3, modbus.WRITE_ONE: 4, modbus.WRITE_MANY: 7}
+"""Address, function, and what says how long the frame would be."""
+
+
+def bad_checksum(data: bytes, blanker: Blanker) -> bytes:
+    """Blank the 13 bytes of an A5 frame whose sum is wrong."""
+    content = _a5_content(data, blanker)
+    if content == data[_HEAD : a5.SIZE - 1]:
+        return data
+    wrong_by = data[-1] - a5.checksum(data[:-1])
+    head = data[:_HEAD] + content
+    return head + bytes(((a5.checksum(head) + wrong_by) & 0xFF,))
+
+
+def short(data: bytes, blanker: Blanker) -> bytes:
+    """Blank a beginning."""
+    if data[0] == a5.START:
+        return data[:_HEAD] + _a5_content(data, blanker)
+    head = _MODBUS_HEADS.get(data[1], 2)
+    return data[:head] + blanker.whole(data[head:], What.DAMAGED, "cut-off frames")
+
+
+def _a5_content(data: bytes, blanker: Blanker) -> bytes:
+    """Blank what stands behind the head of a damaged A5 frame, up to its sum."""
+    content = data[_HEAD : _HEAD + a5_layout.SIZE]
+    where = "frames with a wrong checksum" if len(data) == a5.SIZE else "cut-off frames"
+    spans = a5_layout.request(data[2]) or a5_layout.reply(data[2])
+    if any(span.what in TEXTS or span.what in DATES for span in spans):
+        return blanker.spans(content, [(0, len(content) - 1, What.STALE)], where)
+    return blanker.whole(content, What.DAMAGED, where)
+
+
+def junk(data: bytes, blanker: Blanker) -> bytes:
+    """Blank bytes without any shape."""
+    return blanker.whole(data, What.DAMAGED, "junk")
+
+
+def others(record: Record, blanker: Blanker) -> bytes:
+    """Blank what frames of other protocols carry."""
+    if record.foreign == foreign.MODBUS:
+        return _foreign_modbus(record.data, blanker)
+    if record.foreign == foreign.SINOWEALTH:
+        return _sinowealth(record.data, blanker)
+    if bluetooth_module.is_text(record.data):
+        return _module_text(record.data, blanker)
+    return modbus_data.blank(record.data, None, blanker)
+
+
+def _module_text(data: bytes, blanker: Blanker) -> bytes:
+    """Blank what the Bluetooth module says behind its first word: its name, its address, its versions."""
+    first = re.match(rb"AT(\+[A-Z]*)?|\+[A-Z]*|OK|ERROR|HiLink", data)
+    head = first.end() if first else 0
+    letters = re.sub(rb"[0-9A-Za-z]", b"X", data[head:])
+    return data[:head] + blanker.given(data[head:], letters, What.FOREIGN, "text of the Bluetooth module")
+
+
+def _foreign_modbus(data: bytes, blanker: Blanker) -> bytes:
+    out = b""
+    at = 0
+    while at < len(data):
+        stop = foreign.modbus_step(data, at, len(data))
+        frame = data[at:stop]
+        head = _foreign_head(frame)
+        content = blanker.whole(frame[head:-2], What.FOREIGN, foreign.MODBUS)
+        out += frame if content == frame[head:-2] else modbus_data.with_crc(frame[:head] + content)
+        at = stop
+    return out
+
+
+def _foreign_head(frame: bytes) -> int:
+    """Return how many bytes of a frame say what it is: address, function, registers, count."""
+    function, size = frame[1], len(frame)
+    if function in (0x05, 0x06):
+        return 4
+    if function in (0x0F, 0x10) and size > 8:
+        return 7
+    if function <= 0x04 and (size != 8 or frame[2] == 3):  # a reply; one of three bytes is as long as a request
+        return 3
+    return size - 2
+
+
+def _sinowealth(data: bytes, blanker: Blanker) -> bytes:
+    out = b""
+    at = 0
+    while at < len(data):
+        stop = foreign.sinowealth_step(data, at, len(data), ended=True)
+        exchange = data[at:stop]
+        if len(exchange) > 3:
+            content = blanker.whole(exchange[3:-1], What.FOREIGN, foreign.SINOWEALTH)
+            body = exchange[:3] + content
+            exchange = body + bytes((foreign.crc8(body),))
+        out += exchange
+        at = stop
+    return out
+
+
+def blank(record: Record, blanker: Blanker) -> bytes:
+    """Blank a record that is no frame."""
+    if record.kind is Kind.BAD_CHECKSUM:
+        return bad_checksum(record.data, blanker)
+    if record.kind is Kind.SHORT:
+        return short(record.data, blanker)
+    if record.kind is Kind.FOREIGN:
+        return others(record, blanker)
+    return junk(record.data, blanker)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What must be the same in the copy: which records there are, when, and which belongs to which.
+
+A digest, so that a capture of any length needs no memory. Values are not in it: some of them were blanked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from dalyref.decoder import Decoded
+
+_FIELDS: Final = (
+    "daly.dialect",
+    "daly.foreign",
+    "daly.address",
+    "daly.data_id",
+    "daly.board",
+    "daly.direction",
+    "daly.retry",
+    "daly.request_in",
+    "daly.reply_in",
+    "daly.unanswered",
+    "daly.unasked",
+    "daly.late_to",
+    "daly.other_board",
+    "daly.second_host",
+    "daly.frame_number",
+    "daly.burst.missing",
+    "daly.burst.repeat",
+    "daly.burst.cut_off",
+    "daly.contradiction",
+    "daly.changed",
+    "daly.fault_raised",
+    "daly.fault_cleared",
+    "daly.modbus.function",
+    "daly.modbus.ambiguous",
+)
+
+
+class Structure:
+    """Takes the records of a capture, in order."""
+
+    def __init__(self) -> None:
+        self._digest = hashlib.blake2b()
+
+    def add(self, record: Decoded) -> None:
+        """Take the next record."""
+        fields = record.fields
+        told = (
+            record.number,
+            record.time_ns,
+            record.kind.value,
+            len(record.data),
+            record.interface,
+            record.direction,
+            [fields.get(name) for name in _FIELDS],
+        )
+        self._digest.update(repr(told).encode())
+
+    def digest(self) -> bytes:
+        """Return what two captures of the same structure have alike."""
+        return self._digest.digest()
