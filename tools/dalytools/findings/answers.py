@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
-from dalytools.findings.place import REPLY, REQUEST, Place, address_of, number, place_of, words
+from dalytools.findings.place import REPLY, REQUEST, Place, address_of, first_number, number, place_of, words
 from dalytools.findings.rules import found
 from dalytools.findings.watch import Groups, Watch
 from dalytools.terminal_text import counted
@@ -75,7 +75,7 @@ class Answers(Watch):
         if record.kind is not Kind.FRAME or direction is None:
             return
         if direction == REQUEST:
-            self._askers[record.number] = address_of(fields)
+            self._askers[record.number] = first_number(fields, "daly.can.source", "daly.address", "daly.modbus.address")
             if len(self._askers) > _REMEMBERED:
                 self._askers.popitem(last=False)
             return

@@ -27,6 +27,8 @@ _REMEMBERED = 1024  # requests
 _INVERTERS = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV))
 _SINOWEALTH = "Sinowealth"
 _MODBUS = "Modbus"
+_LONG_S = 3.0
+"""A board that is quiet so long did not just miss a request."""
 _SOMETIMES = (
     "answered at other times: look for damaged bytes and other hosts at these packets, and for requests that come too "
     "fast (few boards answer any closer than 60 ms)"
@@ -56,8 +58,17 @@ class _Line:
     echoed_unanswered: Tally = field(default_factory=Tally)
     """Requests that came back, and that nobody answered."""
     quiet: Tally = field(default_factory=Tally)
-    """Unanswered requests since the last answer."""
+    """Unanswered requests since the last answer, for what was answered before."""
+    longest: Tally = field(default_factory=Tally)
+    """The longest such time that an answer ended."""
     ids: set[int] = field(default_factory=set[int])
+
+    def spoke(self) -> None:
+        """Take note of an answer: what was quiet before is over."""
+        if self.quiet.last_ns - self.quiet.first_ns > self.longest.last_ns - self.longest.first_ns:
+            self.longest = self.quiet
+        if self.quiet.count:
+            self.quiet = Tally()
 
 
 @dataclass(slots=True)
@@ -100,7 +111,7 @@ class Requests(Watch):
             late = self._given_up.get(number(record.fields, "daly.late_to") or 0)
             if late is not None:
                 late.late += 1
-                late.quiet = Tally()
+                late.spoke()
         elif direction == ECHO:
             self._echo(record, bus)
         elif direction == REQUEST:
@@ -126,9 +137,10 @@ class Requests(Watch):
             elif "daly.unanswered" in fields:
                 group.unanswered.add(record.number, record.time_ns)
         if "daly.reply_in" in fields:
-            line.quiet = Tally()
+            line.spoke()
         elif "daly.unanswered" in fields:
-            line.quiet.add(record.number, record.time_ns)
+            if asked.answered:
+                line.quiet.add(record.number, record.time_ns)
             self._given_up[record.number] = line
             if len(self._given_up) > _REMEMBERED:
                 self._given_up.popitem(last=False)
@@ -178,6 +190,11 @@ class Requests(Watch):
         elif line.answered >= SILENT_AFTER and line.quiet.count >= SILENT_AFTER:
             text = f"answered {counted(line.answered, 'request')}, then none of the last {line.quiet.count}"
             yield found("asleep", place, line.quiet, text)
+        elif line.longest.count >= SILENT_AFTER and _seconds(line.longest) >= _LONG_S:
+            text = (
+                f"answered none of {line.longest.count} requests in {_seconds(line.longest):.1f} s, then it did again"
+            )
+            yield found("asleep", place, line.longest, text)
 
     def _silence(self, place: Place) -> str:
         """Advise on an address that nobody answers (field notes, fact 3 and g.1)."""
@@ -223,6 +240,10 @@ class Requests(Watch):
                 here = _DIALECTS.get(name, name)
                 text = f"no request in {here} was answered, but a board answers in {' and '.join(others)}"
                 yield found("other-dialect", Place(bus, detail=here), dialect.unanswered, text)
+
+
+def _seconds(tally: Tally) -> float:
+    return (tally.last_ns - tally.first_ns) / 1e9
 
 
 def _line(record: Decoded, bus: str) -> Place:

@@ -86,7 +86,7 @@ RULES: dict[str, Rule] = {
         (
             "asleep",
             _WARNING,
-            "a board only echoes, or answered and then fell silent: it sleeps",
+            "a board only echoes, or answered and then fell silent, at the end or for a while: it sleeps",
             "wake it with the button, the key pin, or current; RS-485 alone does not wake it",
         ),
         (
@@ -122,7 +122,7 @@ RULES: dict[str, Rule] = {
         ),
         # Values (records.md 9, 11)
         (
-            # No error: between two replies the load can step, which nothing but the next 0x90 and 0x93 would tell.
+            # No error: between two replies the load can step, and step back before the next 0x90 tells of it.
             "contradiction",
             _WARNING,
             "two replies of a board say different things about the same moment",

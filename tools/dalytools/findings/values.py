@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
+from dalytools.findings.load import Held, Load
 from dalytools.findings.place import REPLY, Place, address_of, number, place_of, words
 from dalytools.findings.rules import found
 from dalytools.findings.watch import Groups, Watch
@@ -19,8 +20,17 @@ if TYPE_CHECKING:
     from dalyref.decoder import Decoded
     from dalyref.values import Fields
     from dalytools.findings.finding import Finding
+    from dalytools.findings.load import Board
 
 _EXAMPLES = 3
+_OF_LOAD = frozenset(("pack_voltage", "cell_max", "cell_min"))
+"""Contradictions that a step of the load between the two replies explains."""
+_NEVER_ZERO = frozenset((0x90, 0x91, 0x94, 0x95))
+"""Of these eight bytes of zero say what can't be: 0 V, cell number 0, no cells, frame number 0."""
+_NUMBERED = frozenset((0x95, 0x96))
+"""Of these zeros behind the frame number may be slots that are not used."""
+_ZERO = "00" * 8
+_MOST_ZERO = 64
 _FAULT = "daly.fault."
 _STATES = frozenset(("mos_off_by_command", "charging_cabinet_offline"))  # docs/protocol.md, a.98: no faults
 _SAYS = {
@@ -54,7 +64,10 @@ class Values(Watch):
 
     def __init__(self) -> None:
         self._contradictions = Groups(_Contradiction)
+        self._load = Load()
         self._zero = Groups(Tally)
+        self._runs = Groups(list[tuple[int, int] | None])
+        """Replies of zeros in a row, packet and time; None: they were counted, and so is what follows."""
         self._faults = Groups(_Fault)
         self._told: set[tuple[str, object, object]] = set()  # boards whose faults were told before
         self._unknown = Groups(Tally)
@@ -69,16 +82,53 @@ class Values(Watch):
             self._unknown[place_of(record, bus, asked)].add(record.number, record.time_ns)
         if fields.get("daly.direction") != REPLY:
             return
-        against = words(fields, "daly.contradicts")
-        for name, other in zip(words(fields, "daly.contradiction"), against, strict=False):
-            group = self._contradictions[_board(record, bus, name)]
-            group.tally.add(record.number, record.time_ns)
-            if len(group.pairs) < _EXAMPLES:
-                group.pairs.append(f"packet {record.number} against {other}")
-        if fields.get("daly.pack.voltage") == 0 and fields.get("daly.soc") == 0:
-            self._zero[_board(record, bus)].add(record.number, record.time_ns)
+        self._contradiction(record, bus, fields)
+        self._of_zeros(record, bus, fields)
         if "daly.fault_count" in fields:
             self._fault(record, bus, fields)
+
+    def _contradiction(self, record: Decoded, bus: str, fields: Fields) -> None:
+        board = bus, number(fields, "daly.board"), address_of(fields)
+        for held in self._load.judged(board, fields, record.time_ns):
+            self._contradicts(board, held)
+        against = words(fields, "daly.contradicts")
+        for name, other in zip(words(fields, "daly.contradiction"), against, strict=False):
+            held = Held(name, record.number, record.time_ns, other)
+            # A reply that has the current itself was judged by it.
+            if name not in _OF_LOAD or "daly.pack.current" in fields or not self._load.hold(board, held):
+                self._contradicts(board, held)
+
+    def _contradicts(self, board: Board, held: Held) -> None:
+        bus, named, address = board
+        group = self._contradictions[Place(bus, named, None if named is not None else address, detail=held.name)]
+        group.tally.add(held.packet, held.time_ns)
+        if len(group.pairs) < _EXAMPLES:
+            group.pairs.append(f"packet {held.packet} against {held.other}")
+
+    def _of_zeros(self, record: Decoded, bus: str, fields: Fields) -> None:
+        """Follow replies of nothing but zeros: right for some IDs, but not in a row with one where they can't be."""
+        if fields.get("daly.dialect") != "a5":
+            if fields.get("daly.pack.voltage") == 0 and fields.get("daly.soc") == 0:
+                self._zero[_board(record, bus)].add(record.number, record.time_ns)
+            return
+        place = _board(record, bus)
+        run = self._runs[place]
+        data, data_id = str(fields.get("daly.data", "")), fields.get("daly.data_id")
+        numbered = data_id in _NUMBERED and data[2:] == _ZERO[2:]
+        if data != _ZERO and not numbered:
+            run.clear()
+            return
+        if len(run) < _MOST_ZERO and (data != _ZERO or data_id not in _NEVER_ZERO):
+            if run and run[-1] is None:
+                self._zero[place].add(record.number, record.time_ns)
+            else:
+                run.append((record.number, record.time_ns))
+            return
+        for earlier in run:
+            if earlier is not None:
+                self._zero[place].add(*earlier)
+        run[:] = [None]
+        self._zero[place].add(record.number, record.time_ns)
 
     def _fault(self, record: Decoded, bus: str, fields: Fields) -> None:
         who = bus, fields.get("daly.board"), address_of(fields)
@@ -97,11 +147,14 @@ class Values(Watch):
 
     def findings(self) -> Iterator[Finding]:
         """Say what is contradictory, zero, faulty or unknown."""
+        for board, held in self._load.rest():
+            self._contradicts(board, held)
         for place, group in self._contradictions.items():
             text = f"{_SAYS.get(place.detail, place.detail)}: {counted(group.tally.count, 'time')}"
             yield found("contradiction", place, group.tally, text, examples=tuple(group.pairs))
         for place, tally in self._zero.items():
-            text = f"{counted(tally.count, 'reply', 'replies')} with 0 V and SOC 0 %, which is no battery's state"
+            replies = counted(tally.count, "reply", "replies")
+            text = f"{replies} of nothing but zeros, such as 0 V with SOC 0 %: no battery's state"
             yield found("zero-reply", place, tally, text)
         for place, fault in self._faults.items():
             cleared = f", cleared {counted(fault.cleared, 'time')}" if fault.cleared else ", never cleared"

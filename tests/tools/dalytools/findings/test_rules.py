@@ -7,13 +7,14 @@ import json
 from typing import TYPE_CHECKING
 
 import pytest
-from tests.meaning import a5, cells, status
+from tests.meaning import a5, cells, extremes, status
 from tests.meaning_modbus import brings, read
 from tests.tools.dalytools.findings.injected import (
     BESIDES,
     CASES,
     CLEAN,
     EPOCH_NS,
+    FINE,
     LATER,
     MOS_OFF,
     MOS_ON,
@@ -196,6 +197,57 @@ def test_a_denied_write_says_what_was_asked_and_what_the_board_says(tmp_path: Pa
     assert "asked: discharge MOS off, the board says: discharge MOS on" in denied.text
 
 
+@pytest.mark.parametrize(("raw", "count"), [(30000, 1), (30009, 1), (30011, 0), (29500, 0)])
+def test_a_step_of_the_load_explains_a_contradiction(raw: int, count: int, tmp_path: Path) -> None:
+    """The cells say 3310 mV, then 0x91 3400; the next 0x90 tells whether it is another load (more than 1 A)."""
+    packets = [
+        *CLEAN,
+        *asked(5, 0x91, extremes(3400, 2, 3290, 5)),
+        *asked(5.5, 0x90, a5(1, 0x90, f"00c60000{raw:04x}0181")),
+    ]
+    found = search(capture(tmp_path / "step.pcapng", [*packets, *LATER]))
+    assert sum(finding.tally.count for finding in found if finding.rule == "contradiction") == count
+
+
+@pytest.mark.parametrize(("state", "count"), [(0, 1), (1, 0)])
+def test_another_state_explains_a_contradiction(state: int, count: int, tmp_path: Path) -> None:
+    packets = [
+        *asked(0, 0x93, a5(1, 0x93, "000101")),
+        *CLEAN,
+        *asked(5, 0x91, extremes(3400, 2, 3290, 5)),
+        *asked(5.5, 0x93, a5(1, 0x93, f"{state:02x}0101")),
+        *asked(6, 0x90, PACK),
+    ]
+    found = search(capture(tmp_path / "state.pcapng", [*sorted(packets, key=lambda heard: heard.at), *LATER]))
+    assert sum(finding.tally.count for finding in found if finding.rule == "contradiction") == count
+
+
+def test_replies_of_zeros_in_a_row_are_counted_with_the_one_that_can_not_be(tmp_path: Path) -> None:
+    """0x98 of zeros is no fault, and 0x92 may be; beside a 0x91 of zeros they are of a board that just woke."""
+    zeros = [
+        heard for at, data_id in enumerate((0x98, 0x92, 0x91, 0x93)) for heard in asked(at, data_id, a5(1, data_id))
+    ]
+    (finding,) = search(capture(tmp_path / "woke.pcapng", [*zeros, *asked(5, 0x90, PACK), *asked(6, 0x98, FINE)]))
+    assert finding.rule == "zero-reply"
+    assert (finding.tally.count, finding.tally.first_packet, finding.tally.last_packet) == (4, 2, 8)
+    assert (
+        search(capture(tmp_path / "fine.pcapng", [*asked(-2, 0x98, FINE), *asked(-1, 0x97, a5(1, 0x97)), *CLEAN])) == []
+    )
+
+
+def test_a_board_that_was_silent_for_a_while(tmp_path: Path) -> None:
+    packets = [*CLEAN, *(Heard(5 + 2 * number, a5(0x40, 0x90)) for number in range(3)), *asked(11, 0x90, PACK)]
+    found = search(capture(tmp_path / "gap.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"asleep", "unanswered"}
+    assert one(found, "asleep").text == "answered none of 3 requests in 4.0 s, then it did again"
+
+
+def test_ids_that_were_never_answered_are_no_sleep(tmp_path: Path) -> None:
+    packets = [*CLEAN, *(Heard(5 + 2 * number, a5(0x40, 0x57)) for number in range(5)), Heard(40)]
+    found = search(capture(tmp_path / "unknown.pcapng", packets))
+    assert {finding.rule for finding in found} == {"unanswered"}
+
+
 def test_two_buses_are_kept_apart(tmp_path: Path) -> None:
     packets = [Heard(2.0 * number, a5(0x40, 0x90), interface=number % 2) for number in range(6)] + [
         Heard(30),
@@ -292,6 +344,17 @@ def test_a_silent_board_beside_another_dialect(tmp_path: Path) -> None:
 def test_a_cause_stands_before_what_follows_from_it(tmp_path: Path) -> None:
     found = search(capture(tmp_path / "order.pcapng", [*CASES["asleep"], *LATER]))
     assert [finding.rule for finding in found] == ["asleep", "echo", "unanswered"]
+
+
+def test_lengths_of_bursts_on_can_are_compared_by_who_asks(tmp_path: Path) -> None:
+    """As on a serial line: host 80 gets 16 frames where host 40 gets as many as the cells need."""
+    frames: list[str] = []
+    for host, count in ((0x40, 2), (0x80, 16)) * 3:
+        frames.append(f"989501{host:02x}08000000" + "00" * 8)
+        frames += [f"9895{host:02x}0108000000{number:02x}0ce40ce40ce400" for number in range(1, count + 1)]
+        frames += [f"989001{host:02x}08000000" + "00" * 8, f"9890{host:02x}0108000000" + "00c6000075300181"]
+    rules = {finding.rule for finding in search(can(tmp_path / "lengths.pcapng", *frames))}
+    assert "burst-length" not in rules
 
 
 def can(path: Path, *frames: str) -> Path:

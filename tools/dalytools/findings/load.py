@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Whether the load stepped between two replies that contradict each other: the next reply with a current tells.
+
+    91: 3290..3310 mV | the load steps here | 95: 3250..3270 mV, contradicts 91 | 90: 30 A, it was 0 A -> no finding
+
+The rule of both readings (docs/records.md 11) looks back only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dalyref.values import Fields
+
+STEP_A = 1.0
+"""Currents further apart are another load (docs/records.md 11)."""
+_AGE_NS = 10_000_000_000
+_MOST_HELD, _MOST_BOARDS = 256, 1024
+
+Board = tuple[str, int | None, int | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A contradiction that waits for the next current: its name, packet and time, the other packet."""
+
+    name: str
+    packet: int
+    time_ns: int
+    other: str
+
+
+@dataclass(slots=True)
+class _Known:
+    amperes: float | None = None
+    state: object = None
+
+
+class Load:
+    """Holds contradictions of voltages, by board, until they can be judged."""
+
+    def __init__(self) -> None:
+        self._known: dict[Board, _Known] = {}
+        self._held: dict[Board, list[Held]] = {}
+
+    def judged(self, board: Board, fields: Fields, time_ns: int) -> list[Held]:
+        """Take a reply of a board; return contradictions before it that no step of the load explains."""
+        if board not in self._known and len(self._known) >= _MOST_BOARDS:
+            return []
+        known = self._known.setdefault(board, _Known())
+        amperes, state = fields.get("daly.pack.current"), fields.get("daly.state")
+        out: list[Held] = []
+        held = self._held.get(board)
+        if held:
+            if held[-1].time_ns + _AGE_NS < time_ns:
+                out, held = held, []
+            elif state is not None and known.state is not None and state != known.state:
+                held = []
+            elif isinstance(amperes, float) and known.amperes is not None:
+                out, held = ([] if abs(amperes - known.amperes) > STEP_A else held), []
+            self._held[board] = held
+        if isinstance(amperes, float):
+            known.amperes = amperes
+        if state is not None:
+            known.state = state
+        return out
+
+    def hold(self, board: Board, held: Held) -> bool:
+        """Keep one until the next current; False where that says nothing: it stands at once."""
+        known = self._known.get(board)
+        waiting = self._held.setdefault(board, []) if known is not None else []
+        if known is None or known.amperes is None or len(waiting) >= _MOST_HELD:
+            return False
+        waiting.append(held)
+        return True
+
+    def rest(self) -> list[tuple[Board, Held]]:
+        """Return what waits at the end of the capture: nothing explains it."""
+        return [(board, held) for board, waiting in self._held.items() for held in waiting]
