@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""A text file that appears whole or not at all: written beside its place, then renamed."""
+"""A file that appears whole or not at all: written beside its place, then renamed."""
 
 from __future__ import annotations
 
 import os
 import stat
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 from dalytools.problem import Problem
 
@@ -21,6 +22,19 @@ def whole_file(path: str) -> Generator[TextIO]:
 
     What is no regular file (a pipe, a device) is written directly. Raises Problem where it cannot be written.
     """
+    with whole_binary_file(path) as raw:
+        out = TextIOWrapper(raw, encoding="utf-8", write_through=False)
+        try:
+            yield out
+            out.flush()
+        finally:
+            with suppress(OSError, ValueError):  # told by the flush
+                out.detach()
+
+
+@contextmanager
+def whole_binary_file(path: str) -> Generator[BinaryIO]:
+    """Open `path` for writing bytes, in the same way."""
     place = Path(os.path.realpath(path))
     beside = place.with_name(f".{place.name}.{os.getpid()}.part")
     try:
@@ -28,7 +42,7 @@ def whole_file(path: str) -> Generator[TextIO]:
         if stat.S_ISDIR(mode):
             raise Problem(f"{path} is a directory; name a file in it")
         direct = not stat.S_ISREG(mode)
-        out = place.open("w", encoding="utf-8") if direct else beside.open("x", encoding="utf-8")
+        out = place.open("wb") if direct else beside.open("xb")
     except OSError as error:
         raise Problem(f"{path}: cannot be written: {error.strerror}; name another file with -o") from None
     try:

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""``dalyshark decode``: what the reference decoder reads in a capture, for people (table) or programs (jsonl)."""
+"""``dalyshark decode``: what the reference decoder reads in a capture, for people (table), programs (jsonl), tables."""
 
 from __future__ import annotations
 
 import json
 import os
 import sys
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 from dalycapture.errors import CaptureError
 from dalycapture.linktype import link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
-from dalytools import wire_times
+from dalytools import time_range, wire_times
+from dalytools.exports import export
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.record_lines import line
@@ -24,7 +26,11 @@ from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator, Iterator
+
+    from dalyref.values import Fields
+    from dalytools.exports.export import Plan
+    from dalytools.time_range import TimeRange
 
 _COLOURS = {
     "request": "cyan",
@@ -48,11 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--format",
-        choices=("table", "jsonl"),
+        choices=("table", "jsonl", *export.FORMATS),
         default="table",
-        help="a line a record for people, or an object a record",
+        help="a line a record for people, an object a record, or a table",
     )
     parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
+    time_range.add_arguments(parser)
+    export.add_arguments(parser)
     wire_times.add_arguments(parser)
 
 
@@ -65,14 +73,15 @@ def run(args: argparse.Namespace) -> int:
         for name in files:
             if name != "-" and os.path.realpath(name) == os.path.realpath(output):
                 raise Problem(f"{output} is the capture itself; name another file with -o")
+    plan = export.read(args)
+    span = time_range.read(args)
     problems: list[str] = []
-    with nullcontext(sys.stdout) if output == "-" else whole_file(output) as out:
-        put = _printer(out, args.format, several=len(files) > 1)
+    with _opened(plan, output, options, several=len(files) > 1) as out:
         shown = 0
         for name in files:
             said = len(problems)
-            shown += _decode_file(name, options, put, problems)
-            out.flush()
+            shown += _decode_file(name, options, span, out.put, problems)
+            out.end_file()
             for problem in problems[said:]:
                 print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
         if problems and not shown and output != "-":
@@ -80,9 +89,49 @@ def run(args: argparse.Namespace) -> int:
     return 2 if problems else 0
 
 
+class _Out(Protocol):
+    """Where records go."""
+
+    def put(self, file: str, record: Decoded) -> None:
+        """Take the next record of a file."""
+        ...
+
+    def end_file(self) -> object:
+        """Take the end of a file."""
+        ...
+
+
+class _Lines:
+    """Records as lines: for people, or of JSON."""
+
+    def __init__(self, out: TextIO, put: Callable[[str, Decoded], None]) -> None:
+        self._out = out
+        self._put = put
+
+    def put(self, file: str, record: Decoded) -> None:
+        """Take the next record of a file."""
+        self._put(file, record)
+
+    def end_file(self) -> None:
+        """Let it be seen."""
+        self._out.flush()
+
+
+@contextmanager
+def _opened(plan: Plan, output: str, options: Options, *, several: bool) -> Generator[_Out]:
+    if plan.format in export.FORMATS:
+        with export.opened(plan, output, span_ns=options.limit_ns(options.age)) as table:
+            yield table
+        return
+    wanted = export.wanted(plan)
+    with nullcontext(sys.stdout) if output == "-" else whole_file(output) as out:
+        yield _Lines(out, _printer(out, plan.format, wanted, several=several))
+
+
 def _decode_file(
     name: str,
     options: Options,
+    span: TimeRange,
     put: Callable[[str, Decoded], None],
     problems: list[str],
 ) -> int:
@@ -114,7 +163,8 @@ def _decode_file(
 
         for batch in batches():
             for record in batch:
-                put(name, record)
+                if span.holds(record.time_ns):
+                    put(name, record)
             shown += len(batch)
     if others:
         names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
@@ -138,10 +188,22 @@ def jsonl(record: Decoded, file: str = "") -> str:
     return head + json.dumps(rest)[1:]
 
 
-def _printer(out: TextIO, form: str, *, several: bool) -> Callable[[str, Decoded], None]:
-    """Return what puts one record out: (file name, record). `several` files: it is said which."""
+def _printer(out: TextIO, form: str, wanted: frozenset[str] | None, *, several: bool) -> Callable[[str, Decoded], None]:
+    """Return what puts one record out: (file name, record). `several` files: it is said which.
+
+    wanted: of an object only these fields, and no object that has none of them.
+    """
     if form == "jsonl":
-        return lambda name, record: print(jsonl(record, name if several else ""), file=out)
+
+        def put_object(name: str, record: Decoded) -> None:
+            if wanted is not None:
+                fields: Fields = {key: value for key, value in record.fields.items() if key in wanted}
+                if not fields:
+                    return
+                record = replace(record, fields=fields)
+            print(jsonl(record, name if several else ""), file=out)
+
+        return put_object
     last = ""
 
     def heading(name: str) -> None:

@@ -44,6 +44,10 @@ class Column:
     of_battery: bool = False
     """It tells of the battery, not of the record that told it."""
 
+    def names(self) -> tuple[str, ...]:
+        """Return the names that people have for it: its own, and its field's, with and without ``daly.``."""
+        return (self.name, self.field, self.field.removeprefix(PREFIX)) if self.field else (self.name,)
+
     def value(self, sent: Value) -> Value | None:
         """Return what stands in the table for one value of a record's field."""
         if self.words or self.nothing:
@@ -165,8 +169,9 @@ _NO_SENSOR: Final = _words(
 )
 _HEXADECIMAL: Final = _words(
     """
-    start address data_id checksum balance.mask setting.key_logic modbus.address modbus.function modbus.register
-    modbus.value modbus.absent modbus.crc can.priority can.destination can.source can.register
+    start address data_id data checksum reserved undecoded balance.mask setting.key_logic modbus.address
+    modbus.function modbus.register modbus.value modbus.absent modbus.crc can.priority can.destination can.source
+    can.register
     """
 )
 _OF_THE_RECORD: Final = _words(
@@ -174,8 +179,8 @@ _OF_THE_RECORD: Final = _words(
     kind transport dialect start address data_id unknown_id length data checksum checksum.status direction board
     retry request_in reply_in response_time unanswered unasked late_to other_board second_host write write_result
     frame_number cell.voltage temperature burst.missing burst.repeat burst.cut_off reassembled_in text_part
-    changed_from contradicts can.priority can.destination can.source can.register can.remote reserved undecoded
-    foreign
+    changed changed_from contradiction contradicts can.priority can.destination can.source can.register can.remote
+    reserved undecoded foreign
     """
 )
 """Also the parts of a burst, whose whole is ``cells.voltage``, ``sensors.temperature``, ``battery_code`` ..."""

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""A row a record: all that was on the wire, damaged records too."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dalytools.exports.schema import COMMENT, FIELDS, FILE, INTERFACE, NUMBER, RECORD_COLUMNS, TIME
+from dalytools.terminal_text import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dalyref.decoder import Decoded
+    from dalytools.exports.rows import Row
+    from dalytools.exports.schema import Column
+
+HEAD = (FILE, NUMBER, TIME, INTERFACE)
+CHOICES = (*FIELDS, COMMENT)
+DEFAULT = RECORD_COLUMNS[len(HEAD) :]
+
+
+class Records:
+    """Makes the rows. chosen: which columns stand behind file, number, time and interface."""
+
+    def __init__(self, chosen: Sequence[Column] = DEFAULT, *, only_with: bool = False) -> None:
+        """only_with: leave out records that have none of the chosen columns."""
+        self.columns: Sequence[Column] = (*HEAD, *chosen)
+        self._by_field = {column.field: column for column in chosen if column.field}
+        self._comment = COMMENT in chosen
+        self._only_with = only_with
+
+    def take(self, file: str, record: Decoded) -> Sequence[Row]:
+        """Return the record's row."""
+        row: Row = {
+            FILE.name: plain(file),
+            NUMBER.name: record.number,
+            TIME.name: record.time_ns,
+            INTERFACE.name: record.interface,
+        }
+        heads = len(row)
+        by_field = self._by_field
+        for name, sent in record.fields.items():
+            column = by_field.get(name)
+            if column is not None and (value := column.values(sent)) is not None:
+                row[column.name] = value
+        if self._comment and record.comment:
+            row[COMMENT.name] = plain(record.comment)
+        return () if self._only_with and len(row) == heads else (row,)
+
+    def end_file(self) -> Sequence[Row]:
+        """Nothing is held back."""
+        return ()
