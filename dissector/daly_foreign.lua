@@ -121,10 +121,26 @@ local function all(buf, first, last, frame_end)
   return true
 end
 
+--- Name of other makers' Modbus.
+M.MODBUS = "Modbus RTU"
+
+--- Iterate over the frames of a record of that name: first and last position of each.
+function M.modbus_frames(raw)
+  local last = 0
+  return function()
+    local first = last + 1
+    last = first <= #raw and modbus_end(raw, first, #raw)
+    if last then
+      return first, last
+    end
+    return nil
+  end
+end
+
 --- What buf[first..last] is when it is, whole, other people's traffic: "Modbus RTU", "Sinowealth", or nil.
 function M.name(buf, first, last)
   if all(buf, first, last, modbus_end) then
-    return "Modbus RTU"
+    return M.MODBUS
   elseif all(buf, first, last, sinowealth_end) then
     return "Sinowealth"
   end

@@ -30,6 +30,7 @@ local blind
 local unset = {}
 M.others = {}
 
+local frame_number = Field.new("frame.number")
 local interface_id = Field.new("frame.interface_id")
 local interface_description = Field.new("frame.interface_description")
 local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
@@ -100,6 +101,9 @@ end
 -- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
 local function look_again(number, pinfo, raw)
   local interface, direction = interface_of(blind.interfaces), direction_of(pinfo)
+  if interface.ours then -- as only its description tells, which nobody saw at first
+    handed[number] = nil
+  end
   -- A direction that was known in the first pass too divides nothing that was not divided then.
   local line = interface.key * 4 + (blind.one_way and direction or -1)
   local from, anew =
@@ -179,9 +183,10 @@ function M.dissect(buffer, pinfo, parent, handle)
   if handed[number] then
     if has_frame(items) then
       handed[number] = nil
-    elseif hand_over(buffer, pinfo, parent) then
+    elseif hand_over(buffer, pinfo, parent) and (again or frame_number()) then
       return length
     end
+    -- Without a tree nobody knows yet whose it is: so that Wireshark's Modbus reads it once, in order (daly_mbrtu).
   end
   view.look(parent, handle, from.results, again)
   view.several(parent, buffer, raw, items, pinfo)

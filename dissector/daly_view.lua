@@ -9,6 +9,8 @@ local bursts = require("daly_bursts")
 local exchange = require("daly_exchange")
 local addresses = require("daly_addresses")
 local data_ids = require("daly_data_ids")
+local foreign = require("daly_foreign")
+local mbrtu = require("daly_mbrtu")
 
 local M = {}
 
@@ -496,7 +498,7 @@ local function begin(parent, buffer, offset, length, kind)
   return tree
 end
 
-local function one_record(parent, buffer, raw, item, number)
+local function one_record(parent, buffer, raw, item, pinfo)
   local kind = item.kind
   local offset, length = item.at, item.length
   if item.bytes then
@@ -523,8 +525,11 @@ local function one_record(parent, buffer, raw, item, number)
   if visible and kind ~= "event" then
     node:append_text(", " .. text)
   end
+  if item.name == foreign.MODBUS and transport == "uart" then
+    mbrtu.show(parent, buffer, offset, raw, pinfo)
+  end
   if M.tap then
-    M.tap(number, kind, raw, item.slot, kind == "frame" and item.dialect == "a5" and frame.table, results)
+    M.tap(pinfo.number, kind, raw, item.slot, kind == "frame" and item.dialect == "a5" and frame.table, results)
   end
   return text, source, destination
 end
@@ -553,7 +558,7 @@ function M.several(parent, buffer, raw, items, pinfo)
     if items[i].part then
       text = one_part(parent, buffer, items[i])
     else
-      text, from, to = one_record(parent, buffer, raw, items[i], pinfo.number)
+      text, from, to = one_record(parent, buffer, raw, items[i], pinfo)
     end
     if i <= MOST_WORDS then
       texts[i] = text
