@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 CLOCK_TOLERANCE: Final = 0.01  # of a UART's bit clock
 MOST_LEARNED_NS: Final = 50_000_000
 HALF_BIT: Final = 0.05  # of a byte: a UART hands a byte over in the middle of its stop bit
+USUAL_NS: Final = 50_000  # from a byte in the kernel to our clock: 30 us on a busy processor, 130 on one that slept
 
 
 class Estimate(NamedTuple):
@@ -43,12 +44,14 @@ class Estimate(NamedTuple):
 class _Read(NamedTuple):
     """One read: its bytes begin and end at these offsets of the stream; it returned at time_ns.
 
-    floor_ns: its first byte did not end before. mail_ns: nor did the first byte of the next read end before this.
+    usual_ns: its bytes had come so long before, usually. floor_ns: its first byte did not end before. mail_ns: nor did
+    the first byte of the next read end before this.
     """
 
     begin: int
     end: int
     time_ns: int
+    usual_ns: int
     floor_ns: int
     mail_ns: int
 
@@ -106,7 +109,8 @@ class Timing:
         floor = max(read_ns - self._hold_ns - self._way_ns - late_ns, self._mail_ns)
         if not more:  # else the next read brings what had come by now: nothing is known of its first byte but this
             self._mail_ns = read_ns - self._way_ns - late_ns
-        self._reads.append(_Read(self._end, self._end + length, read_ns, floor, self._mail_ns))
+        usual = min(late_ns, USUAL_NS)
+        self._reads.append(_Read(self._end, self._end + length, read_ns, usual, floor, self._mail_ns))
         self._end += length
 
     def so_far(self) -> tuple[int, int]:
@@ -131,7 +135,7 @@ class Timing:
                 break
             last_ns = read.time_ns
             span = (read.end - start) * c
-            high = min(high, read.time_ns - zero - span)
+            high = min(high, read.time_ns - read.usual_ns - zero - span)
             highest = min(highest, read.time_ns - zero - span * (1 - CLOCK_TOLERANCE))
             span = (read.begin - start + 1) * c
             low = max(low, read.floor_ns - zero - span)

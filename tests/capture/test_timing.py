@@ -53,7 +53,7 @@ def test_an_adapter_that_holds_nothing_back_is_believed_to_the_byte() -> None:
     for number in range(13):
         one.add(1, (51 + number) * MS, MS // 10)
     start, bound, consistent = one.estimate(0, 13)
-    assert (start, consistent) == (50 * MS, True)
+    assert (start, consistent) == (50 * MS - MS // 20, True)  # a byte lies in the kernel for 50 us, usually
     assert bound <= 0.2 * MS
 
 
@@ -62,7 +62,7 @@ def test_our_own_lateness_widens_the_bound() -> None:
     one = timing(hold_ms=0)
     one.add(13, 100 * MS, 30 * MS)
     start, bound, consistent = one.estimate(0, 13)
-    assert (start, consistent) == (87 * MS, True)
+    assert (start, consistent) == (87 * MS - MS // 20, True)
     assert bound == pytest.approx((30 - 12 + 0.01) * MS, rel=0.01)  # it may have begun at 69
 
 

@@ -26,6 +26,7 @@ COMMANDS = {
     "decode": "show what the reference decoder reads in a capture",
     "check": "hold the Wireshark dissector against the reference decoder",
     "report": "a page with plots and tables, in one file that opens offline",
+    "survey": "which IDs and registers were seen, which bytes move, and with what",
     "redact": "a copy fit to be shown to others: codes, numbers, passwords, names and dates blanked",
     "reframe": "cut an old capture, or a raw log, into records again",
     "import": "a log of another tool becomes a capture",

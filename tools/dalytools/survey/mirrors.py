@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Bytes that hold what another frame holds: copies, and what a board left in its buffer.
+
+A byte is looked at when it changes: its new value either stands in the newest payload of another place, at the same
+byte each time, or it does not. What fits at the first few changes is a candidate; most go at the next change.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from dalytools.survey.stream import Stream
+
+_LOOKED_FOR: Final = 4
+"""New candidates are looked for at so many changes."""
+_MOST: Final = 2000
+_MOST_VALUES: Final = 32
+
+
+@dataclass(slots=True)
+class Candidate:
+    """A byte that may be the one that is copied."""
+
+    source: Stream
+    index: int
+    hits: int = 0
+    misses: int = 0
+    values: set[int] = field(default_factory=set[int])
+    """Some of those with which it was equal."""
+
+
+class Mirrors:
+    """Looks for the sources of every byte of one place."""
+
+    __slots__ = ("_bytes", "_changes")
+
+    def __init__(self, size: int) -> None:
+        self._bytes: list[dict[tuple[int, int], Candidate]] = [{} for _ in range(size)]
+        self._changes = [0] * size
+
+    def take(self, mine: Stream, before: bytes, after: bytes, others: Iterable[Stream]) -> None:
+        """Take a payload that is not equal to the one before it. others: all places of the bus."""
+        for index, value in enumerate(after):
+            if before[index] == value:
+                continue
+            candidates = self._bytes[index]
+            if candidates:
+                self._hold(candidates, value)
+            changes = self._changes[index] = self._changes[index] + 1
+            if changes <= _LOOKED_FOR:
+                self._look(candidates, mine, value, others, changes - 1)
+
+    @staticmethod
+    def _hold(candidates: dict[tuple[int, int], Candidate], value: int) -> None:
+        gone: list[tuple[int, int]] = []
+        for key, candidate in candidates.items():
+            if candidate.source.last[candidate.index] == value:
+                candidate.hits += 1
+                if len(candidate.values) < _MOST_VALUES:
+                    candidate.values.add(value)
+            else:
+                candidate.misses += 1
+                if 20 * (candidate.misses - 3) > candidate.hits:
+                    gone.append(key)
+        for key in gone:
+            del candidates[key]
+
+    @staticmethod
+    def _look(
+        candidates: dict[tuple[int, int], Candidate], mine: Stream, value: int, others: Iterable[Stream], missed: int
+    ) -> None:
+        for other in others:
+            if other is mine or len(candidates) >= _MOST:
+                continue
+            index = other.last.find(value)
+            while index >= 0:
+                candidates.setdefault((other.index, index), Candidate(other, index, 1, missed, {value}))
+                index = other.last.find(value, index + 1)
+
+    def of(self, index: int) -> list[Candidate]:
+        """Return what a byte was found equal to."""
+        return list(self._bytes[index].values())
+
+    def changes(self, index: int) -> int:
+        """Return how often a byte changed."""
+        return self._changes[index]
