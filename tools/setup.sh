@@ -4,7 +4,7 @@
 # Makes a fresh Debian or Ubuntu ready. Needs only git, make and a network; asks nothing.
 #
 #   setup.sh run    what `make run` needs: Python >= 3.11, tshark, .venv with dalyshark in it
-#   setup.sh dev    the same, and what `make test` needs: linters, Lua, strace, a browser, the Node tools in .cache/node
+#   setup.sh dev    the same, and what `make test` needs: linters, Lua, strace, tmux, a browser, the Node tools in .cache/node
 #
 # Does nothing, in no time and without a network, when it did its work before and neither pyproject.toml, nor the list
 # of Node tools, nor this file changed since. System packages are installed where that is allowed (root, or sudo without
@@ -19,7 +19,7 @@ node=$here/.cache/node
 want=${1:-run}
 case $want in
 run) system_programs='' ;;
-dev) system_programs='luacheck lua5.2 lua5.4 strace chromium' ;;
+dev) system_programs='luacheck lua5.2 lua5.4 strace tmux chromium' ;;
 *) echo "setup: say run or dev, not $want" >&2 && exit 2 ;;
 esac
 export PIP_DISABLE_PIP_VERSION_CHECK=1

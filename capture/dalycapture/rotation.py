@@ -100,6 +100,11 @@ class FileSeries:
         return self.current.name
 
     @property
+    def paths(self) -> list[Path]:
+        """The files that are there, the current one last."""
+        return [*self._files, *([self.current.path] if self.current.path else [])]
+
+    @property
     def size(self) -> int:
         """Bytes written so far, in all files."""
         return self._before + self.current.size

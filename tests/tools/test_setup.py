@@ -115,7 +115,7 @@ def test_tests_need_more(machine: Machine) -> None:
     run = machine.setup("dev")
     assert run.returncode == 2
     [line] = said(run)
-    assert "install lua-check lua5.2 lua5.4 strace chromium  then" in line
+    assert "install lua-check lua5.2 lua5.4 strace tmux chromium  then" in line
 
 
 def test_another_system_is_told_the_packages(machine: Machine) -> None:

@@ -24,7 +24,7 @@ from dalyref.packet import SERIAL_LINK_TYPES, CanFrame
 from dalyref.streams import Located
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from dalyref.kinds import Record
     from dalyref.packet import Direction, Packet, Transport
@@ -69,10 +69,14 @@ class _Recognised:
 
 
 class Decoder:
-    """Decodes packets as they come. A record comes out when nothing later can change it: after about two seconds."""
+    """Decodes packets as they come. A record comes out when nothing later can change it: after about two seconds.
 
-    def __init__(self, options: Options | None = None) -> None:
+    early: called with each record at once, in the order in which they come out; later ones may still add to its fields.
+    """
+
+    def __init__(self, options: Options | None = None, *, early: Callable[[Decoded], None] | None = None) -> None:
         self._options = options or Options()
+        self._early = early
         self._order = FileOrder[_Recognised](self._options)
         self._buses: dict[tuple[Transport, int | str], Bus] = {}
         self._bus_of: dict[int, tuple[str, Bus]] = {}  # by serial interface: its description, its bus
@@ -163,7 +167,7 @@ class Decoder:
             "can",
             frame.comment,
         )
-        self._held.append((decoded, slate))
+        self._hold(decoded, slate)
 
     def _decode(self, located: Located) -> None:
         packet, record = located.packet, located.record
@@ -191,7 +195,12 @@ class Decoder:
             packet.transport,
             packet.comment,
         )
+        self._hold(decoded, slate)
+
+    def _hold(self, decoded: Decoded, slate: Slate | None) -> None:
         self._held.append((decoded, slate))
+        if self._early:
+            self._early(decoded)
 
     def _final(self, *, everything: bool = False) -> list[Decoded]:
         out: list[Decoded] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import sys
 import threading
@@ -14,18 +15,22 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import TracebackType
 
-_MARK = b"mM\r\n"
+_MARK = frozenset("mM\r\n")
+_KEY = re.compile(rb"\x1b[\[O][0-9;]*[A-Za-z~]|[\x00-\xff]", re.DOTALL)
+_NAMES = {b"\x1b[C": "right", b"\x1bOC": "right", b"\x1b[D": "left", b"\x1bOD": "left", b"\x1bOM": "\r"}
 
 
 class Keys:
     """Reads the terminal's keys while the block runs; the terminal is as before afterwards.
 
-    mark: called, in a thread of this class's own, for each key that marks. Without a terminal nothing happens. A
-    capture that was sent to the background is not stopped for its keys.
+    mark: called, in a thread of this class's own, for each key that marks. pressed: called with each other one: a
+    character, ``left`` or ``right``; Ctrl-Z then does nothing, as there is a screen that would stay behind. Without a
+    terminal nothing happens. A capture that was sent to the background is not stopped for its keys.
     """
 
-    def __init__(self, mark: Callable[[], None]) -> None:
+    def __init__(self, mark: Callable[[], None], pressed: Callable[[str], None] | None = None) -> None:
         self._mark = mark
+        self._pressed = pressed
         self._fd = -1
         self._before: list[Any] = []
         self._handlers: dict[signal.Signals, Any] = {}
@@ -51,6 +56,10 @@ class Keys:
             for number in (signal.SIGTTIN, signal.SIGTTOU):
                 self._handlers[number] = signal.signal(number, signal.SIG_IGN)
             tty.setcbreak(fd, termios.TCSANOW)
+            if self._pressed:
+                mode = termios.tcgetattr(fd)
+                mode[6][termios.VSUSP] = os.fpathconf(fd, "PC_VDISABLE").to_bytes()
+                termios.tcsetattr(fd, termios.TCSANOW, mode)
             self._fd = fd
             self._waker = os.pipe()
             threading.Thread(target=self._read, name="keys", daemon=True).start()
@@ -73,9 +82,12 @@ class Keys:
                 continue
             if not keys:  # the terminal is gone
                 return
-            for key in keys:
+            for found in _KEY.findall(keys):
+                key = _NAMES.get(found) or found.decode("latin-1")
                 if key in _MARK:
                     self._mark()
+                elif self._pressed:
+                    self._pressed(key)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -15,7 +16,7 @@ from typing import IO, TYPE_CHECKING
 
 import pytest
 from tests.capture.bus import Bus
-from tests.tools.dalytools.made import ANSWER, ASK, SAMPLES, a5
+from tests.tools.dalytools.made import ANSWER, ASK, SAMPLES, a5, write
 
 from dalycapture.reader import read_capture
 
@@ -321,3 +322,58 @@ def test_quiet_shows_the_summary_only(tmp_path: Path) -> None:
     assert watch.rows() == []
     assert "Summary of 1." in watch.out
     assert "records: 0 differences" in watch.out
+
+
+def test_a_series_of_files(bus: Bus, tmp_path: Path) -> None:
+    """``watch`` keeps files as ``capture`` does; its summary and its check are of all of them."""
+    told, statistics = tmp_path / "told", tmp_path / "s.json"
+    words = ["-b", "packets:2", "-b", f"printname:{told}", "--sha256", "-c", "5", "--stats", statistics]
+    watch = Watch(bus.port, "-w", tmp_path / "x.pcapng", *words)
+    watch.until("Listening")
+    for frame in (frames := [ASK, ANSWER, a5(0x40, 0x98), a5(1, 0x98), ASK]):
+        bus.send(frame)
+    watch.end(0)
+    files = sorted(tmp_path.glob("x_*.pcapng"))
+    assert [data_in(path) for path in files] == [frames[:2], frames[2:4], frames[4:]]
+    assert told.read_text().split() == [str(path) for path in files]
+    assert all(path.with_name(f"{path.name}.sha256").exists() for path in files)
+    assert "  Records      5: 5 good\n" in watch.out
+    assert "  Requests     3, 1 unanswered, 0 retries, 0 echoes\n" in watch.out
+    assert "5 records: 0 differences\n" in watch.out
+    assert f"The capture: {files[2]}, the last of 3: {files[0]} and so on\n" in watch.out
+    assert json.loads(statistics.read_text())["records"] == 5
+
+
+def test_going_on_in_a_file(bus: Bus, tmp_path: Path) -> None:
+    path = write(tmp_path / "x.pcapng", [(0, ASK), (0.1, ANSWER)])
+    watch = Watch(bus.port, "-w", path, "--append", "-a", "packets:1")
+    watch.until("Listening")
+    bus.send(ASK)
+    watch.end(0)
+    assert data_in(path) == [ASK, ANSWER, ASK]
+    assert "  Records      3: 3 good\n" in watch.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-b", "printname:-"], "standard output shows the records, so printname:- is not possible; name a file"),
+        (["--append", "-b", "packets:2"], "--append goes on in one file, -b begins new ones; leave one of them out"),
+        (["--dashboard", "-q"], "argument -q/--quiet: not allowed with argument --dashboard"),
+        (["-a", "packets:0"], "'0' is not a whole number from 1 up"),
+    ],
+)
+def test_what_can_not_be(words: list[str], message: str, bus: Bus, tmp_path: Path) -> None:
+    watch = Watch(bus.port, "-w", tmp_path / "x.pcapng", *words)
+    watch.end(2)
+    assert message in watch.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_dashboard_needs_a_terminal(bus: Bus, tmp_path: Path) -> None:
+    watch = Watch(bus.port, "-w", tmp_path / "x.pcapng", "--dashboard", "-c", "1")
+    watch.until("Listening")
+    bus.send(ASK)
+    watch.end(0)
+    assert watch.rows() == ["Request board 1  0x90 Pack"]
+    assert watch.err == "dalyshark watch: no terminal for a dashboard: lines instead\n"

@@ -7,7 +7,6 @@ import argparse
 import contextlib
 import signal
 import sys
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dalycapture.create import open_writer
@@ -15,9 +14,9 @@ from dalycapture.errors import CaptureError
 from dalycapture.interface import bus_name
 from dalycapture.linktype import DEFAULT_LINK_TYPE, check_link_type
 from dalycapture.rotation import FileSeries
-from dalycapture.sniffer import End, Limits, Sniffer, Tally
+from dalycapture.sniffer import End, Sniffer, Tally
 from dalycapture.writer import counted
-from dalytools import __version__, file_options
+from dalytools import __version__, file_options, stop_options
 from dalytools.adapter_list import list_adapters
 from dalytools.capture_summary import summary, write_statistics
 from dalytools.detection import detect_settings
@@ -26,9 +25,11 @@ from dalytools.listening import Tap, add_listening_options, named, open_sides, t
 from dalytools.port_options import checked, settings_of
 from dalytools.problem import Problem
 from dalytools.status_line import StatusLine
+from dalytools.stop_options import positive
 
 if TYPE_CHECKING:
     from dalycapture.rotation import Keeping
+    from dalycapture.sniffer import Limits
     from dalycapture.writer import CaptureWriter
 
 
@@ -48,17 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="find the speed and format of PORT by listening (24 s at most where nothing is heard), and end",
     )
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file; - is standard output")
-    parser.add_argument(
-        "-a",
-        dest="limits",
-        metavar="CONDITION",
-        action="append",
-        default=[],
-        type=_limit,
-        help="stop after duration:SECONDS, packets:N, filesize:KB (1000 bytes) or, with -b, files:N; may be given more "
-        "than once",
-    )
-    parser.add_argument("-c", dest="packets", metavar="N", type=_positive, help="stop after N records")
+    stop_options.add_arguments(parser)
     parser.add_argument("--bus", type=checked(bus_name), default="main", help="name of the bus (default: %(default)s)")
     parser.add_argument(
         "-F",
@@ -97,14 +88,7 @@ def run(args: argparse.Namespace) -> int:
             raise Problem(str(error)) from None
     if not args.output:
         raise Problem("say where the capture goes: -w FILE, or -w - for standard output")
-    limits, files = Limits(), None
-    for name, value in args.limits:
-        if name == "files":
-            files = value
-        else:
-            limits = replace(limits, **{name: value})
-    if args.packets is not None:
-        limits = replace(limits, packets=args.packets)
+    limits, files = stop_options.read(args)
     try:
         tally, sink = _capture(args, taps, limits, file_options.read(args, stop_after=files))
     except CaptureError as error:
@@ -149,36 +133,8 @@ def _where(sink: CaptureWriter, asked: str) -> str:
     return f"{output.name}, the last of {counted(output.number, 'file')}"
 
 
-def _positive(text: str) -> int:
-    """Read a whole number from 1 up."""
-    if not text.isascii() or not text.isdecimal() or not 0 < int(text[:19]) <= 10**18:
-        message = f"{text!r} is not a whole number from 1 up"
-        raise argparse.ArgumentTypeError(message)
-    return int(text)
-
-
-def _limit(text: str) -> tuple[str, float | int]:
-    """Read one of dumpcap's stop conditions: (field of Limits, value)."""
-    name, colon, value = text.partition(":")
-    if colon and name == "duration":
-        try:
-            seconds = float(value)
-        except ValueError:
-            seconds = -1.0
-        if 0 < seconds < 1e9:
-            return name, seconds
-        message = f"{value!r} is not a number of seconds above 0"
-        raise argparse.ArgumentTypeError(message)
-    if colon and name in {"packets", "files"}:
-        return name, _positive(value)
-    if colon and name == "filesize":
-        return name, _positive(value) * 1000
-    message = f"{text!r} is not a stop condition; use duration:SECONDS, packets:N, filesize:KB or files:N"
-    raise argparse.ArgumentTypeError(message)
-
-
 def _link_type(text: str) -> int:
-    number = _positive(text)
+    number = positive(text)
     try:
         return check_link_type(number)
     except CaptureError as error:

@@ -2,15 +2,16 @@
 """``dalyshark watch``: sniff a bus, keep the capture, show every record decoded by tshark as it comes, sum up, check.
 
     bus --> sniffer --+--> capture file --> summary, check
-                      +--> tshark with our dissector --> a line a record
+                      +--> tshark with our dissector --> a line a record, or
+                      +--> dashboard
 
 Without a port it watches a simulated bus: a real session first, then boards that are simulated.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
+import dataclasses
 import itertools
 import os
 import signal
@@ -24,12 +25,15 @@ from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
 from dalycapture.interface import bus_name
 from dalycapture.reader import read_capture
-from dalycapture.sniffer import End, Limits, Sniffer, Tally
+from dalycapture.rotation import FileSeries
+from dalycapture.sniffer import End, Sniffer, Tally
 from dalyref.decoder import Options, decode
-from dalytools import __version__
-from dalytools.capture_summary import side_sentences
+from dalytools import __version__, file_options, stop_options
+from dalytools.capture_summary import side_sentences, write_statistics
 from dalytools.commands.check import SHOWN
 from dalytools.comparison import compare
+from dalytools.dashboard.status import Key, Status
+from dalytools.dashboard.view import DashboardView, has_screen
 from dalytools.keys import Keys
 from dalytools.listening import Tap, add_listening_options, named, open_sides, taps_of
 from dalytools.live_view import LiveView
@@ -40,8 +44,13 @@ from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark, dissector_folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import argparse
+    from collections.abc import Callable, Iterator, Sequence
 
+    from dalycapture.captured import CapturedPacket
+    from dalycapture.rotation import Keeping
+    from dalycapture.sniffer import Limits
+    from dalycapture.writer import CaptureWriter
     from dalytools.simulator.live import SimulatedBus
     from dalytools.simulator.scenario import Scenario
 
@@ -70,26 +79,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = "Exit status: 0 fine, 1 the two decoders differ, 2 could not run or the port was lost."
     parser.add_argument("-w", dest="output", metavar="FILE", help="capture file (default: captures/daly-TIME.pcapng)")
-    parser.add_argument("--duration", type=_seconds, metavar="S", help="stop after so many seconds")
+    parser.add_argument("--duration", type=stop_options.seconds, metavar="S", help="the same as -a duration:S")
+    stop_options.add_arguments(parser)
     parser.add_argument("--bus", default="main", help="name of the bus (default: %(default)s)")
-    parser.add_argument("-q", "--quiet", action="store_true", help="do not show records, only the summary")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument(
+        "--dashboard",
+        action="store_true",
+        help="a screen instead of lines: boards, cells, faults, the bus; its keys: m marks, p pauses, Tab goes to the "
+        "next board, q ends. Where standard output is no terminal: lines",
+    )
+    shown.add_argument("-q", "--quiet", action="store_true", help="do not show records, only the summary")
+    parser.add_argument("--stats", metavar="FILE", help="write what was heard as JSON, at the end")
     add_listening_options(parser)
+    file_options.add_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Watch until Ctrl-C, SIGTERM, the time is over or the port is lost; sum up and check."""
+    limits, files = stop_options.read(args)
+    keeping = file_options.read(args, stop_after=files)
+    if keeping.rotation.printname == "-":
+        raise Problem("standard output shows the records, so printname:- is not possible; name a file")
     try:
         bus_name(args.bus)
         path = _output(args.output)
         screen = _Screen()
         with Tshark() as tshark:
             bus = None if taps_of(args) else _simulated_bus(args.baud)
-            if bus and args.duration is None:
-                args.duration = SIMULATED_S
-            tally = _watch(args, tshark, screen, path, bus)
+            duration = args.duration or limits.duration or (SIMULATED_S if bus else None)
+            limits = dataclasses.replace(limits, duration=duration)
+            tally, sink = _watch(args, tshark, screen, bus=bus, path=path, keeping=keeping, limits=limits)
+            paths = sink.output.paths if isinstance(sink.output, FileSeries) else [path]
+            tally.notes += sink.notes
+            if args.stats:
+                write_statistics(args.stats, tally, {"output": str(path)})
             if screen.failure:
-                return _unseen(screen.failure, path)
-            return _sum_up(tshark, path, tally, Options(baud=args.baud))
+                return _unseen(screen.failure, paths[-1])
+            return _sum_up(tshark, paths, tally, sink, Options(baud=args.baud))
     except CaptureError as error:
         raise Problem(str(error)) from None
 
@@ -146,26 +173,40 @@ def _output(asked: str | None) -> Path:
     return next(path for name in names if not (path := Path(FOLDER, name)).exists())
 
 
-def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path, bus: SimulatedBus | None) -> Tally:
+def _watch(
+    args: argparse.Namespace,
+    tshark: Tshark,
+    screen: _Screen,
+    *,
+    bus: SimulatedBus | None,
+    path: Path,
+    keeping: Keeping,
+    limits: Limits,
+) -> tuple[Tally, CaptureWriter]:
     taps = [Tap("", bus.tap)] if bus else taps_of(args)
-    duration: float | None = args.duration
     with contextlib.ExitStack() as stack:
         sides = open_sides(args, taps)
         for side in sides:
             stack.callback(side.close)
         if not args.output:
             _make_folder(path.parent)
-        sinks = [open_writer(path, application=APPLICATION)]
-        view, faults = None, list[str]()
-        until = f"for {duration:g} s" if duration else "until Ctrl-C"
-        said = plain(f"Listening to {named(taps)} at {args.baud} baud {until}; writing {path}")
+        sink = open_writer(path, application=APPLICATION, keeping=keeping)
+        sinks = [sink]
+        until = f"for {limits.duration:g} s" if limits.duration else "until Ctrl-C"
+        said = plain(f"Listening to {named(taps)} at {args.baud} baud {until}; writing {sink.output.name}")
         screen(f"{said}\n")
-        if not args.quiet:
+        view, faults = None, list[str]()
 
-            def ended(why: str) -> None:
-                faults.append(f"the live view broke off, the capture did not: {why}")
-                print(f"dalyshark watch: {faults[-1]}", file=sys.stderr)  # noqa: T201
+        def ended(why: str) -> None:
+            faults.append(f"the live view broke off, the capture did not: {why}")
+            print(f"dalyshark watch: {faults[-1]}", file=sys.stderr)  # noqa: T201
 
+        dashboard = None
+        if args.dashboard and has_screen():
+            view = dashboard = DashboardView(ended, baud=args.baud, application=APPLICATION)
+        elif not args.quiet:
+            if args.dashboard:
+                print("dalyshark watch: no terminal for a dashboard: lines instead", file=sys.stderr)  # noqa: T201
             view = LiveView(
                 tshark,
                 screen,
@@ -174,10 +215,12 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path
                 link_type=sides[0].interface.link_type,
                 application=APPLICATION,
             )
+        if view:
             stack.callback(view.finish)
             sinks.append(view.sink)
-        sniffer = Sniffer(sides, sinks, limits=Limits(duration=duration), verbose=args.verbose)
-        stack.enter_context(Keys(sniffer.mark))
+        ticker = _teller(dashboard, named(taps), args.baud, sink) if dashboard else None
+        sniffer = Sniffer(sides, sinks, limits=limits, ticker=ticker, verbose=args.verbose)
+        stack.enter_context(Keys(sniffer.mark, _keys(dashboard, sniffer) if dashboard else None))
         screen.when_gone = sniffer.stop
         if screen.failure:  # nobody reads already
             sniffer.stop()
@@ -188,7 +231,40 @@ def _watch(args: argparse.Namespace, tshark: Tshark, screen: _Screen, path: Path
         with contextlib.suppress(ValueError):
             tally.notes.remove(str(view.sink.broken()))
     tally.notes += faults
-    return tally
+    return tally, sink
+
+
+def _teller(dashboard: DashboardView, ports: str, baud: int, sink: CaptureWriter) -> Callable[[Tally], None]:
+    """Return what tells the dashboard, a few times a second, how the capture goes."""
+
+    def tell(tally: Tally) -> None:
+        dashboard.tell(
+            Status(
+                port=ports,
+                baud=baud,
+                file=sink.output.name,
+                seconds=tally.seconds,
+                records=tally.records,
+                marks=tally.marks,
+                written=sink.output.size,
+                lost=sink.lost + sum(side.lost for side in tally.sides),
+                away=[side.name for side in tally.sides if side.away],
+            )
+        )
+
+    return tell
+
+
+def _keys(dashboard: DashboardView, sniffer: Sniffer) -> Callable[[str], None]:
+    """Return what takes a key: q ends the capture, the rest is for the dashboard."""
+
+    def pressed(key: str) -> None:
+        if key in {"q", "Q"}:
+            sniffer.stop()
+        else:
+            dashboard.tell(Key(key))
+
+    return pressed
 
 
 def _make_folder(folder: Path) -> None:
@@ -233,11 +309,11 @@ def _unseen(failure: OSError, path: Path) -> int:
     raise failure  # its usual end: status 0
 
 
-def _sum_up(tshark: Tshark, path: Path, tally: Tally, options: Options) -> int:
-    """Print the summary of the file just written, the verdict of both readings, and where it is."""
+def _sum_up(tshark: Tshark, paths: Sequence[Path], tally: Tally, sink: CaptureWriter, options: Options) -> int:
+    """Print the summary of the files just written, the verdict of both readings, and where they are."""
     summary = Summary()
     with progress_bar("reading") as advance:
-        for record in decode(read_capture(path), options):
+        for record in decode(_packets(paths), options):
             summary.add(record)
             if record.number % 1024 == 0:
                 advance(record.number)
@@ -252,40 +328,53 @@ def _sum_up(tshark: Tshark, path: Path, tally: Tally, options: Options) -> int:
         print(f"  {plain(sentence)}")  # noqa: T201
     for note in tally.notes:
         print(f"  Note: {plain(note)}")  # noqa: T201
-    differences = _checked(tshark, path, options) if tally.records else 0
-    where = plain(str(path))
-    print(f"\nThe capture: {where}")  # noqa: T201
+    differences = _checked(tshark, paths, options) if tally.records else 0
+    where = plain(str(paths[-1]))
+    several = f", the last of {len(paths)}: {plain(str(paths[0]))} and so on" if len(paths) > 1 else ""
+    print(f"\nThe capture: {where}{several}")  # noqa: T201
     print(f"Open it:     wireshark -X lua_script:{dissector_folder() / 'daly.lua'} {where}")  # noqa: T201
+    if sink.lost:
+        raise Problem(
+            f"{counted(sink.lost, 'record')} of {tally.records} could not be written: {'; '.join(sink.notes)}"
+        )
     if tally.end is End.PORT_LOST:
         raise Problem(tally.problem)
     return 1 if differences else 0
 
 
-def _checked(tshark: Tshark, path: Path, options: Options) -> int:
-    """Compare both readings of the file; print and return how many differences there are."""
+def _packets(paths: Sequence[Path]) -> Iterator[CapturedPacket]:
+    """Yield the packets of a series of files, numbered on."""
+    number = 0
+    for path in paths:
+        for packet in read_capture(path):
+            number += 1
+            yield dataclasses.replace(packet, number=number)
+
+
+def _checked(tshark: Tshark, paths: Sequence[Path], options: Options) -> int:
+    """Compare both readings of each file; print and return how many differences there are."""
+    records = found = 0
+    shown: list[str] = []
+    broken = ""
     try:
-        with progress_bar("check") as advance:
-            result = compare(tshark, path, options=options, progress=advance)
+        for path in paths:
+            with progress_bar("check") as advance:
+                result = compare(tshark, path, options=options, progress=advance)
+            records += result.records
+            found += result.found
+            shown += [str(difference) for difference in result.differences[: SHOWN - len(shown)]]
+            if result.broken:
+                broken = f"the check broke off: {result.broken}; the capture is in {path}"
+                break
     except KeyboardInterrupt:
-        print(f"\nCheck: left out, as you wish; later: dalyshark check {path}")  # noqa: T201
+        print(f"\nCheck: left out, as you wish; later: dalyshark check {paths[-1]}")  # noqa: T201
         return 0
     print(  # noqa: T201
         f"\nCheck: dissector (tshark {tshark.version}) against reference decoder, "
-        f"{counted(result.records, 'record')}: {counted(result.found, 'difference')}"
+        f"{counted(records, 'record')}: {counted(found, 'difference')}"
     )
-    for difference in result.differences[:SHOWN]:
-        print(f"  {plain(str(difference))}")  # noqa: T201
-    if result.broken:
-        raise Problem(f"the check broke off: {result.broken}; the capture is in {path}")
-    return result.found
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not 0 < seconds < 1e9:
-        message = f"{text!r} is not a number of seconds above 0"
-        raise argparse.ArgumentTypeError(message)
-    return seconds
+    for difference in shown:
+        print(f"  {plain(difference)}")  # noqa: T201
+    if broken:
+        raise Problem(broken)
+    return found
