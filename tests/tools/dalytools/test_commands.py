@@ -23,4 +23,4 @@ def test_every_module_is_a_command() -> None:
 def test_every_command_can_be_loaded_and_is_in_the_readme(name: str) -> None:
     module = importlib.import_module(f"dalytools.commands.{MODULES.get(name, name)}")
     assert callable(module.run)
-    assert f"dalyshark {name}" in README
+    assert f"`dalyshark {name}" in README or f"; `{name}`" in README
