@@ -135,7 +135,7 @@ local function show(from, slot, id, data, remote, buffer, pinfo, parent, handle,
     view.one(parent, buffer, length, "frame", frame.raw, slot, pinfo, classic.show, frame)
   elseif found == can_bus.HKMS then
     frame.raw = data
-    view.one(parent, buffer, length, "frame", hkms.counted(frame), slot, pinfo, hkms.show, frame)
+    view.one(parent, buffer, length, "frame", view.tap and hkms.counted(frame), slot, pinfo, hkms.show, frame)
   else
     frame.name = found
     view.one(parent, buffer, length, "foreign", data, slot, pinfo, show_foreign, frame)

@@ -26,29 +26,9 @@ local function on(value)
   return value ~= 0 and "on" or "off"
 end
 
--- By register: name; show(data) adds the fields, words(data) returns the words.
-local registers = {
-  [0x0400] = { "Cell voltages" },
-  [0x0401] = { "Temperatures" },
-  [0x0402] = { "Pack" },
-  [0x0403] = { "Power" },
-  [0x0404] = { "Cell extremes" },
-  [0x0405] = { "Temp. extremes" },
-  [0x0406] = { "MOS status" },
-  [0x0407] = { "State" },
-  [0x0408] = { "Status" },
-  [0x0409] = { "Fault info" },
-  [0x040A] = { "Balance" },
-  [0x040B] = { "Charge info" },
-  [0x040C] = { "Clock" },
-  [0x040D] = { "Limits" },
-  [0x040E] = { "Faults" },
-  [0x182A] = { "Charge MOS" },
-  [0x182C] = { "Discharge MOS" },
-  [0x161E] = { "SOC" },
-  [0x181E] = { "SOC" },
-}
+local names = hkms_bus.NAMES
 
+-- By register: show(data) adds the fields, words(data) returns the words.
 local show, words = {}, {}
 
 -- 0402: voltage.2 current.2 soc.2
@@ -308,7 +288,7 @@ end
 local as_a5 = {}
 
 function as_a5.names()
-  return format("Board %d  0x%04X %s: ", shape.source, shape.register, registers[shape.register][1]), who(shape)
+  return format("Board %d  0x%04X %s: ", shape.source, shape.register, names[shape.register]), who(shape)
 end
 
 function as_a5.board()
@@ -326,7 +306,11 @@ end
 
 --- The bytes of a frame for daly_stat.
 function M.counted(frame)
-  return is_as_a5(frame) and hkms_bus.as_a5(frame.shape, frame.raw) or frame.raw
+  local of = frame.shape
+  if is_as_a5(frame) then
+    return hkms_bus.as_a5(of, frame.raw)
+  end
+  return hkms_bus.counted(of.register, of.keep_alive and 0 or of.board or 0, frame.raw)
 end
 
 --- For daly_view.one. `frame`: { raw = its bytes, shape =, slot =, remote =, length = }.
@@ -356,7 +340,7 @@ function M.show(item, frame, wanted)
     show[register](data)
   end
   local said = enough and words[register] and words[register](data) or view.hex_words(data, 1, length)
-  local text = format("0x%04X %s", register, registers[register][1])
+  local text = format("0x%04X %s", register, names[register])
   if shape.writes then
     item:add_proto_expert_info(experts.write, "WRITE: " .. said)
     return format("WRITE board %d  %s: %s", shape.destination, text, said), source, destination

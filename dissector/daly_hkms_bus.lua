@@ -18,6 +18,48 @@ local MOST_CELLS, MOST_SENSORS = 48, 21
 --- Registers whose frames are laid out as those of a data ID.
 M.AS_A5 = { [0x0400] = 0x95, [0x0401] = 0x96 }
 
+--- Names of the registers.
+M.NAMES = {
+  [0x0400] = "Cell voltages",
+  [0x0401] = "Temperatures",
+  [0x0402] = "Pack",
+  [0x0403] = "Power",
+  [0x0404] = "Cell extremes",
+  [0x0405] = "Temp. extremes",
+  [0x0406] = "MOS status",
+  [0x0407] = "State",
+  [0x0408] = "Status",
+  [0x0409] = "Fault info",
+  [0x040A] = "Balance",
+  [0x040B] = "Charge info",
+  [0x040C] = "Clock",
+  [0x040D] = "Limits",
+  [0x040E] = "Faults",
+  [0x182A] = "Charge MOS",
+  [0x182C] = "Discharge MOS",
+  [0x161E] = "SOC",
+  [0x181E] = "SOC",
+}
+
+--- Any other frame for daly_stat: 00 | board, 0: a keep-alive | register u16 | data, shorter than one of those below.
+function M.counted(register, board, data)
+  return string.char(0, board, math.floor(register / 256), register % 256) .. data
+end
+
+--- Board, register and number of data bytes of a frame in either form.
+function M.uncounted(raw)
+  local _, board, a, b = byte(raw, 1, 4)
+  if #raw < 13 then
+    return board, a * 256 + b, #raw - 4
+  end
+  for register, id in pairs(M.AS_A5) do
+    if id == a then
+      return board, register, b
+    end
+  end
+  return board, 0, b
+end
+
 --- A frame of those in the form of an A5 frame, but for its first byte: it is none.
 function M.as_a5(shape, data)
   return classic.as_a5(M.AS_A5[shape.register], data, shape.destination, shape.source, 0)

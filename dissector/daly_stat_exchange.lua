@@ -1,10 +1,13 @@
 -- SPDX-License-Identifier: GPL-2.0-or-later
 --
--- Who asked what, who answered, and how fast: per board and data ID. Pure Lua, no Wireshark.
+-- Who asked what, who answered, and how fast: per board and data ID, per board and registers (Modbus), per board and
+-- register (HKMS). Pure Lua, no Wireshark.
 
 local exchange = require("daly_exchange")
 local addresses = require("daly_addresses")
 local DATA_IDS = require("daly_data_ids")
+local hkms = require("daly_hkms_bus")
+local modbus = require("daly_stat_modbus")
 
 local M = {}
 
@@ -24,10 +27,17 @@ Report.__index = Report
 
 --- An empty report.
 function M.new()
-  return setmetatable(
-    { kinds = {}, rows = {}, records = 0, bytes = 0, boards = {}, unknown = {}, requests = {} },
-    Report
-  )
+  return setmetatable({
+    kinds = {},
+    rows = {}, -- of A5
+    modbus = modbus.new(),
+    hkms = {}, -- frames by register and board
+    records = 0,
+    bytes = 0,
+    boards = {},
+    unknown = {},
+    requests = {}, -- that may stay unanswered: row, slot, results, one behind the other
+  }, Report)
 end
 
 -- The row of a board (0: none is named) and an ID.
@@ -42,12 +52,40 @@ local function row_of(report, board, id)
   return row
 end
 
+-- Whether a request stays unanswered is known when all was read.
+local function note_request(report, row, slot, results)
+  local list = report.requests
+  local n = #list
+  list[n + 1], list[n + 2], list[n + 3] = row, slot, results
+end
+
+-- A frame that is none of A5: of Modbus, or of HKMS. Returns how many bytes it had on the wire.
+local function count_other(report, number, raw, slot, results)
+  if not results.can then
+    local row, answers = report.modbus:count(number, raw, slot, results)
+    if row then
+      note_request(report, row, slot, results)
+    elseif answers then
+      report.boards[answers] = true
+    end
+    return #raw
+  end
+  local board, register, length = hkms.uncounted(raw)
+  local key = register * 256 + board
+  report.hkms[key] = (report.hkms[key] or 0) + 1
+  return length
+end
+
 --- Count one record.
 function Report:record(pinfo, kind, raw, slot, _, results)
   local whole = kind == "frame" and #raw == 13 and byte(raw) == 0xA5
   -- A frame of CAN comes in the form of an A5 frame (daly_bus).
   local on_can = results.can and whole
-  self.records, self.bytes = self.records + 1, self.bytes + (on_can and byte(raw, 4) or #raw)
+  local length = on_can and byte(raw, 4) or #raw
+  if kind == "frame" and not whole then
+    length = count_other(self, pinfo.number, raw, slot, results)
+  end
+  self.records, self.bytes = self.records + 1, self.bytes + length
   self.kinds[kind] = (self.kinds[kind] or 0) + 1
   self.first = self.first or pinfo.rel_ts
   self.last = pinfo.rel_ts
@@ -76,9 +114,7 @@ function Report:record(pinfo, kind, raw, slot, _, results)
     if results.flag[slot] == "retry" then
       row.retries = row.retries + 1
     end
-    -- Whether it stays unanswered is known when all was read.
-    local n = #self.requests
-    self.requests[n + 1], self.requests[n + 2], self.requests[n + 3] = row, slot, results
+    note_request(self, row, slot, results)
   end
 end
 
@@ -106,6 +142,105 @@ end
 
 local COLUMNS = "%-5s %-23s %7s %7s %6s %6s %6s %6s  %8s %8s %8s %8s"
 
+local function count(value)
+  return format("%d", value)
+end
+
+-- A row of a table; `columns`: board, name, and six more.
+local function line(columns, times)
+  local shown = { "", "", "", "" }
+  if #times > 0 then
+    shown = { spread(times) }
+    for k = 1, 4 do
+      shown[k] = format("%.1f", shown[k])
+    end
+  end
+  for k = 1, 4 do
+    columns[8 + k] = shown[k]
+  end
+  return (format(COLUMNS, table.unpack(columns, 1, 12)):gsub("%s+$", ""))
+end
+
+local function heading(lines, name, again, echo, last)
+  lines[#lines + 1] = ""
+  lines[#lines + 1] = "                                                                         response time, ms"
+  local columns = { "board", name, "request", "replies", "no rep", again, echo, last, "min", "mean", "95 %", "max" }
+  lines[#lines + 1] = format(COLUMNS, table.unpack(columns))
+end
+
+local function a5_table(report, lines, missing)
+  local rows = {}
+  for _, row in pairs(report.rows) do
+    rows[#rows + 1] = row
+  end
+  if #rows == 0 then
+    return
+  end
+  table.sort(rows, function(a, b)
+    return a.key < b.key
+  end)
+  heading(lines, "data ID", "again", "echo", "damage")
+  for _, row in ipairs(rows) do
+    lines[#lines + 1] = line({
+      row.board and count(row.board) or "any",
+      format("0x%02X %s", row.id, DATA_IDS[row.id] or "unknown ID"),
+      count(row.requests),
+      count(row.replies),
+      count(missing[row] or 0),
+      count(row.retries),
+      count(row.echoes),
+      count(row.damaged),
+    }, row.times)
+  end
+end
+
+local function modbus_table(report, lines, missing)
+  local rows = report.modbus:sorted()
+  if #rows == 0 then
+    return
+  end
+  heading(lines, "Modbus, registers", "", "", "refuse")
+  for _, row in ipairs(rows) do
+    lines[#lines + 1] = line({
+      row.board,
+      row.name,
+      count(row.requests),
+      count(row.replies),
+      count(missing[row] or 0),
+      "",
+      "",
+      count(row.refused),
+    }, row.times)
+  end
+  local reasons = report.modbus:reasons()
+  if reasons then
+    lines[#lines + 1] = "exception codes: " .. reasons
+  end
+end
+
+local function hkms_table(report, lines)
+  local keys = {}
+  for key in pairs(report.hkms) do
+    keys[#keys + 1] = key
+  end
+  if #keys == 0 then
+    return
+  end
+  table.sort(keys)
+  lines[#lines + 1] = ""
+  lines[#lines + 1] = "board HKMS register            frames"
+  for _, key in ipairs(keys) do
+    local board = key % 256
+    local register = (key - board) / 256
+    lines[#lines + 1] = format(
+      "%-5s %-23s %7d",
+      board > 0 and count(board) or "any",
+      board > 0 and format("0x%04X %s", register, hkms.NAMES[register]) or "keep-alive",
+      report.hkms[key]
+    )
+  end
+end
+
 --- The report as text.
 function Report:text()
   if self.records == 0 then
@@ -114,9 +249,9 @@ function Report:text()
   local lines = {}
   local parts = {}
   for i = 1, #KINDS do
-    local count = self.kinds[KINDS[i][1]]
-    if count then
-      parts[#parts + 1] = format("%d %s", count, KINDS[i][2])
+    local number = self.kinds[KINDS[i][1]]
+    if number then
+      parts[#parts + 1] = format("%d %s", number, KINDS[i][2])
     end
   end
   lines[1] =
@@ -124,7 +259,7 @@ function Report:text()
   local boards = {}
   for board = 0, 0x1F do
     if self.boards[board] then
-      boards[#boards + 1] = format("%d", board)
+      boards[#boards + 1] = count(board)
     end
   end
   lines[2] = #boards > 0 and "boards that answer: " .. concat(boards, ", ") or "no board answers"
@@ -137,58 +272,10 @@ function Report:text()
   if #unknown > 0 then
     lines[3] = "frames with an unknown data ID: " .. concat(unknown, ", ")
   end
-  local rows = {}
-  for _, row in pairs(self.rows) do
-    rows[#rows + 1] = row
-  end
-  table.sort(rows, function(a, b)
-    return a.key < b.key
-  end)
-  if #rows > 0 then
-    lines[#lines + 1] = ""
-    lines[#lines + 1] = "                                                                         response time, ms"
-    lines[#lines + 1] = format(
-      COLUMNS,
-      "board",
-      "data ID",
-      "request",
-      "replies",
-      "no rep",
-      "again",
-      "echo",
-      "damage",
-      "min",
-      "mean",
-      "95 %",
-      "max"
-    )
-  end
   local missing = unanswered(self)
-  for i = 1, #rows do
-    local row = rows[i]
-    local times = { "", "", "", "" }
-    if #row.times > 0 then
-      times = { spread(row.times) }
-      for k = 1, 4 do
-        times[k] = format("%.1f", times[k])
-      end
-    end
-    lines[#lines + 1] = format(
-      COLUMNS,
-      row.board and format("%d", row.board) or "any",
-      format("0x%02X %s", row.id, DATA_IDS[row.id] or "unknown ID"),
-      format("%d", row.requests),
-      format("%d", row.replies),
-      format("%d", missing[row] or 0),
-      format("%d", row.retries),
-      format("%d", row.echoes),
-      format("%d", row.damaged),
-      times[1],
-      times[2],
-      times[3],
-      times[4]
-    ):gsub("%s+$", "")
-  end
+  a5_table(self, lines, missing)
+  modbus_table(self, lines, missing)
+  hkms_table(self, lines)
   return concat(lines, "\n")
 end
 

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from tests.dissector.can_frames import SOCKETCAN, hkms, keep_alive, reply, request
 from tests.dissector.dissection import EPOCH_NS, P, a5
+from tests.traffic import with_crc
 
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
@@ -21,8 +23,13 @@ if TYPE_CHECKING:
     from dalytools.tshark import Tshark
 
 SAMPLES = sorted(Path(__file__).resolve().parents[2].joinpath("pcap_samples").glob("*.pcap*"))
-FRAME_S = 13 * 10 / 9600
+CHARACTER_S = 10 / 9600
+FRAME_S = 13 * CHARACTER_S
 ASK, ANSWER = a5(0x40, 0x90), a5(1, 0x90, "0215000075300200")
+
+
+def crc(text: str) -> str:
+    return with_crc(bytes.fromhex(text)).hex()
 
 
 def capture(tshark: Tshark, packets: Sequence[P]) -> Path:
@@ -85,6 +92,69 @@ def test_unknown_ids_are_counted(tshark: Tshark) -> None:
     assert "\nframes with an unknown data ID: 0x0F (1), 0xAB (2)\n" in text
 
 
+def modbus_rows(text: str) -> dict[tuple[str, str], list[str]]:
+    """The lines of Modbus: (board, "dialect function word registers") -> columns behind the name."""
+    lines = [line for line in text.splitlines() if line[6:9] in ("d2 ", "81 ")]
+    return {(line[:5].strip(), line[6:29].strip()): line[30:].split() for line in lines}
+
+
+def test_modbus(tshark: Tshark) -> None:
+    """Answered after 40 ms, refused after 20 ms, unanswered; a reply to none; a write and its reply; board 2 of the
+    other dialect."""
+    asked, reply = crc("d20300000002"), crc("d20304000a000b")
+    packets = [
+        P(asked, 0),
+        P(reply, 8 * CHARACTER_S + 0.040),
+        P(asked, 2),
+        P(crc("d28302"), 2 + 8 * CHARACTER_S + 0.020),
+        P(asked, 4),
+        P(crc("d203020001"), 6),
+        P(crc("d20600a50001"), 8),
+        P(crc("d20600a50001"), 8 + 8 * CHARACTER_S + 0.030),
+        P(crc("820301000003"), 10),
+        P(crc("520306000100020003"), 10 + 8 * CHARACTER_S + 0.010),
+        P(crc("81100100000200010002"), 12),
+        P(asked, 14),  # nothing is known of the last
+    ]
+    for passes in (), ("-2",):
+        text = ask(tshark, capture(tshark, packets), "daly,stat", passes=passes)
+        #              requests replies no rep refuse min mean 95 % max
+        assert modbus_rows(text) == {
+            ("D2", "d2 03 read 0000-0001"): ["4", "2", "1", "1", "20.0", "30.0", "40.0", "40.0"],
+            ("D2", "d2 03 read ? (1)"): ["0", "1", "0", "0"],
+            ("D2", "d2 06 write 00A5"): ["1", "1", "0", "0", "30.0", "30.0", "30.0", "30.0"],
+            ("2", "81 03 read 0100-0102"): ["1", "1", "0", "0", "10.0", "10.0", "10.0", "10.0"],
+            ("1", "81 10 write 0100-0101"): ["1", "0", "1", "0"],
+        }
+        assert "\nexception codes: 0x02 (1)\n" in text
+        assert "boards that answer: 2\n" in text
+        assert "data ID" not in text
+
+
+def test_can(tshark: Tshark) -> None:
+    """Classic frames as on a line; HKMS by register."""
+    frames = [
+        request(0x90),
+        reply(0x90, "0215000075300230", at=0.025),
+        keep_alive(1.0),
+        hkms(0x0402, "0215753002300000", at=1.1),
+        hkms(0x0402, "0215753002300000", at=1.2),
+        hkms(0x0400, "010ce40ce50ce600", at=1.3),
+    ]
+    path = tshark.home / "statistics-can.pcapng"
+    with open_writer(path) as writer:
+        writer.add_interface(Interface("made", "can0", SOCKETCAN))
+        for frame in frames:
+            writer.write_packet(EPOCH_NS + round(frame.at * 1e9), bytes.fromhex(frame.hex))
+    path.chmod(0o644)
+    text = ask(tshark, path, "daly,stat")
+    assert "6 records: 6 frames; 48 bytes in 1.300 s" in text
+    assert rows(text)["1", "0x90"] == ["1", "1", "0", "0", "0", "0", "25.0", "25.0", "25.0", "25.0"]
+    said = [" ".join(line.split()) for line in text.splitlines()]
+    at = said.index("board HKMS register frames")
+    assert said[at + 1 : at + 4] == ["any keep-alive 1", "1 0x0400 Cell voltages 1", "1 0x0402 Pack 2"]
+
+
 def test_a_filter_picks_packets(tshark: Tshark) -> None:
     text = ask(tshark, capture(tshark, SESSION), "daly,stat,daly.data_id == 0x93")
     assert rows(text) == {("any", "0x93"): ["1", "0", "1", "0", "0", "0"]}
@@ -111,10 +181,18 @@ def test_several_records_in_a_packet(tshark: Tshark) -> None:
 
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
 def test_the_reference_counts_the_same(tshark: Tshark, sample: Path) -> None:
-    found = rows(ask(tshark, tshark.readable(sample), "daly,stat"))
+    text = ask(tshark, tshark.readable(sample), "daly,stat")
+    found = rows(text)
     requests, replies, missing, again, echoes, damaged = (Counter[tuple[str, str]]() for _ in range(6))
+    modbus = {name: Counter[tuple[str, str]]() for name in ("request", "reply", "no reply", "refused")}
     for record in decode(read_capture(sample)):
         fields = record.fields
+        if fields.get("daly.dialect") in ("d2", "81") and record.kind.value == "frame":
+            key = str(fields.get("daly.board", "D2")), f"{int(str(fields['daly.modbus.function'])) & 0x7F:02X}"
+            modbus["request"][key] += fields["daly.direction"] == 1
+            modbus["reply"][key] += fields["daly.direction"] == 2
+            modbus["no reply"][key] += "daly.unanswered" in fields
+            modbus["refused"][key] += "daly.modbus.exception" in fields
         if fields.get("daly.dialect") != "a5" or record.kind.value not in ("frame", "bad_checksum"):
             continue
         address = int(str(fields["daly.address"]))
@@ -130,6 +208,11 @@ def test_the_reference_counts_the_same(tshark: Tshark, sample: Path) -> None:
     assert {key: [int(word) for word in words[:6]] for key, words in found.items()} == {
         key: [count[key] for count in (requests, replies, missing, again, echoes, damaged)] for key in requests
     }
+    summed = {name: Counter[tuple[str, str]]() for name in modbus}
+    for (board, name), columns in modbus_rows(text).items():
+        for what, column in zip(summed, columns, strict=False):
+            summed[what][board, name[3:5]] += int(column)
+    assert summed == modbus
 
 
 def test_cells_and_sensors(tshark: Tshark) -> None:
