@@ -56,6 +56,8 @@ class Decoded:
     transport: Transport = "uart"
     comment: str = ""
     """The packet's comment, of an event its text: not from the wire, and not to be trusted."""
+    connection: str = ""
+    """Bluetooth, TCP: as the packet names it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +196,7 @@ class Decoder:
             packet.direction,
             packet.transport,
             packet.comment,
+            connection=packet.connection,
         )
         self._hold(decoded, slate)
 

@@ -21,17 +21,14 @@ from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError, reason
 from dalycapture.output import refuse_other_files
 from dalycapture.reader import read_capture
-from dalyref.decoder import Decoder
 from dalytools import __version__
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.redact.blanker import Blanker
-from dalytools.redact.carriers import carried
 from dalytools.redact.copies import Copies, shapes
 from dalytools.redact.fill import Fill
 from dalytools.redact.labels import Labels
 from dalytools.redact.redactor import Redactor
-from dalytools.redact.structure import Structure
 from dalytools.redact.tally import Tally
 
 if TYPE_CHECKING:
@@ -188,15 +185,12 @@ class _Between:
 
 def _structure(path: Path, options: Options) -> bytes:
     """Read the copy as anybody would."""
-    structure = Structure()
-    decoder = Decoder(options)
+    tally = Tally()
+    redactor = Redactor(options, Blanker(Fill(), tally, Copies(), frozenset(), learning=True), tally, _ignore)
     for packet in _read(str(path), "redact, proving", Told(), []):
-        for inner, _ in carried(packet):
-            for record in decoder.feed(inner):
-                structure.add(record)
-    for record in decoder.finish():
-        structure.add(record)
-    return structure.digest()
+        redactor.feed(packet)
+    redactor.finish()
+    return redactor.structure.digest()
 
 
 def _prove(path: Path, copies: Copies) -> None:

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dalycapture.captured import CapturedPacket
 
 
@@ -24,6 +26,10 @@ class Held:
     data: bytearray
     undecided: int = 0
     """So many of its bytes belong to records that are not known yet."""
+    close: Callable[[bytearray], None] | None = None
+    """What is to be done when all bytes are decided: check sums."""
+    gone: bool = False
+    """It was given up: what is decided now comes too late."""
 
 
 class OutOfStepError(Exception):
@@ -45,14 +51,33 @@ class Line:
         """Decide the next bytes: they are `old`, and become `new`. Raises OutOfStepError where they are not."""
         at = 0
         while at < len(old):
-            if not self._pieces:
+            held, start, count = self._next(len(old) - at)
+            if held.packet.data[start : start + count] != old[at : at + count]:
                 raise OutOfStepError
-            held, start, size = self._pieces.popleft()
-            count = min(size, len(old) - at)
-            if bytes(held.data[start : start + count]) != old[at : at + count]:
-                raise OutOfStepError
-            held.data[start : start + count] = new[at : at + count]
-            held.undecided -= count
+            if not held.gone:
+                held.data[start : start + count] = new[at : at + count]
+                held.undecided -= count
             at += count
-            if count < size:
-                self._pieces.appendleft((held, start + count, size - count))
+
+    def move(self, size: int, other: Line) -> None:
+        """Hand the next bytes over to another line. Raises OutOfStepError where there are not so many."""
+        while size:
+            held, start, count = self._next(size)
+            other._pieces.append((held, start, count))
+            size -= count
+
+    def give_up(self, held: Held) -> None:
+        """Blank what is undecided of a packet."""
+        for one, start, size in self._pieces:
+            if one is held:
+                held.data[start : start + size] = bytes(size)
+
+    def _next(self, most: int) -> tuple[Held, int, int]:
+        """Take the next piece, or a part of it."""
+        if not self._pieces:
+            raise OutOfStepError
+        held, start, size = self._pieces.popleft()
+        if size > most:
+            self._pieces.appendleft((held, start + most, size - most))
+            return held, start, most
+        return held, start, size

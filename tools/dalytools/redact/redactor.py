@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Final, Protocol
 from dalyref import a5, addresses
 from dalyref.decoder import Decoder
 from dalyref.kinds import Dialect, Kind, Record
-from dalytools.redact import a5_data, can_frames, damaged, modbus_data
-from dalytools.redact.carriers import around, carried
+from dalytools.redact import a5_data, damaged, modbus_data
+from dalytools.redact.carriers import Carriers
 from dalytools.redact.labels import comment
-from dalytools.redact.lines import Held, Line
+from dalytools.redact.lines import Held
 from dalytools.redact.structure import Structure
 from dalytools.redact.what import LOOKED_FOR, named
-from dalytools.wires.carriers import SOCKETCAN
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,12 +27,13 @@ if TYPE_CHECKING:
     from dalycapture.captured import CapturedPacket
     from dalyref.decoder import Decoded
     from dalyref.options import Options
-    from dalyref.packet import Packet
     from dalyref.values import Fields
     from dalytools.redact.blanker import Blanker
     from dalytools.redact.tally import Tally
 
 _A5_HEAD: Final = 4
+_MOST_HELD: Final = 100_000
+"""Packets that wait for the rest of a record, which may never come."""
 
 
 class Taker(Protocol):
@@ -54,7 +54,7 @@ class Redactor:
         self._tally = tally
         self._take = take
         self._a5 = a5_data.A5Data(blanker)
-        self._lines: dict[object, Line] = {}
+        self._carriers = Carriers(blanker, self._a5)
         self._held: deque[Held] = deque()
         self._number = 0
 
@@ -67,27 +67,27 @@ class Redactor:
         if packet.number != tally.packets:
             packet = replace(packet, number=tally.packets)  # as in the copy
         tally.next_record()
-        fed = carried(packet)
-        if packet.link_type == SOCKETCAN:
-            held = Held(packet, bytearray(can_frames.blank(packet.data, packet.interface, self._a5, self._blanker)))
-        else:
-            held = Held(packet, bytearray(around(packet, sum(len(each.packet.data) for each in fed), self._blanker)))
+        held = Held(packet, bytearray(packet.data))
         self._held.append(held)
-        for inner, start in fed:
-            if start >= 0 and inner.data:
-                self._lines.setdefault(_line(inner), Line()).add(held, start, len(inner.data))
+        for inner in self._carriers.feed(held):
             self._records(self._decoder.feed(inner))
+        if len(self._held) > _MOST_HELD:
+            self._carriers.give_up(self._held[0])
         self._release()
 
     def finish(self) -> None:
         """Take the end of the file."""
+        for inner in self._carriers.finish():
+            self._records(self._decoder.feed(inner))
         self._records(self._decoder.finish())
         self._release()
 
     def _release(self) -> None:
-        while self._held and not self._held[0].undecided:
+        while self._held and (self._held[0].gone or not self._held[0].undecided):
             held = self._held.popleft()
             packet = held.packet
+            if held.close is not None:
+                held.close(held.data)
             said = comment(packet.comment, event=not packet.data)
             self._tally.comments += bool(packet.comment) and said != packet.comment
             self._take(packet, bytes(held.data), said)
@@ -101,7 +101,8 @@ class Redactor:
                 continue
             self._tally.next_record()
             new = self._blank(record)
-            self._lines[record.interface, record.direction].replace(record.data, new)
+            line = self._carriers.lines[record.connection or record.interface, record.direction]
+            line.replace(record.data, new)
 
     def _learn(self, fields: Fields) -> None:
         """Take what was put together of several frames."""
@@ -130,9 +131,6 @@ class Redactor:
         if addresses.is_request(data[1]):
             new = self._a5.request(data_id, content, where)
         else:
-            new = self._a5.reply(data_id, content, (record.interface, data[1]), where)
+            board = record.connection or record.interface, data[1]
+            new = self._a5.reply(data_id, content, board, where)
         return data if new == content else a5.build(data[1], data_id, new)
-
-
-def _line(packet: Packet) -> object:
-    return packet.interface, packet.direction

@@ -55,6 +55,7 @@ class Structure:
             record.kind.value,
             len(record.data),
             record.interface,
+            record.connection,
             record.direction,
             [fields.get(name) for name in _FIELDS],
         )

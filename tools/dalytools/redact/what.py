@@ -28,6 +28,8 @@ class What(StrEnum):
     OLDER = "stale bytes of before the capture"
     UNKNOWN = "bytes that nobody explains"
     FOREIGN = "other protocols"
+    TRAFFIC = "other traffic"
+    ADDRESS = "addresses"
     DAMAGED = "damaged bytes"
 
 

@@ -129,3 +129,16 @@ def test_any_traffic_keeps_its_records(tmp_path: Path, seed: int) -> None:
         for each in (path, out)
     )
     assert old == new
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from((0, 1, 101, 113, 147, 187, 201, 227, 250, 254, 276, 999)),
+    st.lists(st.binary(max_size=80), max_size=12),
+)
+def test_any_bytes_under_any_link_type(tmp_path: Path, link_type: int, packets: list[bytes]) -> None:
+    """Nothing breaks, and lengths stay."""
+    path, out = tmp_path / "in.pcapng", tmp_path / "out.pcapng"
+    write_serial(path, packets, link_type=link_type)
+    redact(str(path), str(out), Options(), frozenset())
+    assert [len(packet.data) for packet in read_capture(out)] == [len(packet) for packet in packets]
