@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import sys
 import zlib
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from dalycapture.pcapng import read_pcapng
 from dalycapture.source import Source
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
     from dalycapture.captured import CapturedPacket, Told
 
@@ -48,11 +48,18 @@ def read_capture(path: Path | str, told: Told | None = None) -> Iterator[Capture
     CaptureError (one line) when the file is missing, no capture, or damaged, and TruncatedError after the last whole
     packet when it ends in the middle of one.
     """
+    with opened(path) as source:
+        yield from packets(source, told)
+
+
+@contextmanager
+def opened(path: Path | str) -> Generator[Source]:
+    """Open a file, or standard input for ``-``. What the system refuses is a CaptureError, of one line."""
     name = "standard input" if str(path) == "-" else str(path)
     with ExitStack() as stack:
         try:
             stream = sys.stdin.buffer if str(path) == "-" else stack.enter_context(Path(path).open("rb"))
-            yield from _packets(Source(stream, name), told)
+            yield Source(stream, name)
         except FileNotFoundError:
             raise CaptureError(f"{name}: there is no such file") from None
         except IsADirectoryError:
@@ -63,7 +70,13 @@ def read_capture(path: Path | str, told: Told | None = None) -> Iterator[Capture
             raise CaptureError(f"{name}: can not be read: {reason(error)}") from None
 
 
-def _packets(source: Source, told: Told | None) -> Iterator[CapturedPacket]:
+def is_pcapng(source: Source) -> bool:
+    """Tell whether a source that nothing was read of is pcapng, not compressed."""
+    return source.peek(4) == _PCAPNG
+
+
+def packets(source: Source, told: Told | None = None) -> Iterator[CapturedPacket]:
+    """Yield the packets of an opened file; see ``read_capture``."""
     if source.peek(2) == _GZIP:
         try:
             with gzip.GzipFile(fileobj=source) as unpacked:  # pyright: ignore[reportArgumentType]

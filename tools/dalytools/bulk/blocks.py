@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""pcapng to columns of packets: blocks of one size in a row at once, what is unlike its neighbours one by one.
+
+    | 6 48 .. 48 | 6 48 .. 48 | 6 48 .. 48 | 6 60 .. flags .. 60 | 5 .. | 6 48 .. 48 |     type, length .. length
+    |<------- a run: one look at all ----->|<- walked ->|        ^ the plain reader's
+
+A packet block is taken here when its two lengths agree, its data fits, its interface is described, and it has no
+option but flags. All else, and whatever is wrong, goes through the plain reader, whose words and errors it gives.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dalycapture.errors import CaptureError
+from dalycapture.pcapng import BYTE_ORDER_MAGIC, ENHANCED_PACKET, MAX_BLOCK, PcapngReader
+from dalycapture.source import Source
+from dalytools.bulk.packets import SPARE, Gathered, Packets
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dalycapture.captured import Told
+    from dalytools.bulk.arrays import Bytes, Flags, Ints, Words32
+    from dalytools.bulk.packets import Interfaces
+
+CHUNK: Final = 1 << 21
+"""Bytes read at a time."""
+_HEAD: Final = 7
+"""Words of a packet block before its data."""
+_LEAST: Final = 8
+"""Words of a packet block without data."""
+_FLAGS: Final = 2 | 4 << 16
+"""Code and length of the option, as one little-endian word."""
+_SHORT_RUN: Final = 16
+_WALKED: Final = 128
+"""So many blocks are walked one by one after a short run."""
+
+
+class BlockReader:
+    """Reads one pcapng file."""
+
+    def __init__(self, source: Source, interfaces: Interfaces, told: Told, *, chunk: int = CHUNK) -> None:
+        """interfaces: takes those that the file describes. chunk: bytes read at a time."""
+        self._source = source
+        self._interfaces = interfaces
+        self._reader = PcapngReader(source, told)
+        self._chunk = chunk
+        self._parts: list[tuple[Ints, ...]] = []
+        self._rows = Gathered()
+        self._extra = bytearray()
+        self._comments: dict[int, str] = {}
+        self._data = b""  # the chunk at hand
+        self._start = 0  # its first byte's offset in the file
+
+    def packets(self) -> Iterator[Packets]:
+        """Yield the packets, some at a time. Raises what ``read_pcapng`` raises, after the packets before."""
+        left = b""
+        while True:
+            more = self._source.read(self._chunk)
+            self._start = self._source.offset - len(more) - len(left)
+            self._data = left + more
+            problem: CaptureError | None = None
+            done = 0
+            try:
+                done = self._walk()
+                if not more and done < len(self._data):
+                    self._plain(done, len(self._data))  # says how it is cut off
+                    done = len(self._data)
+            except CaptureError as error:
+                problem = error
+            packets = self._collected()
+            if len(packets):
+                yield packets
+            if problem:
+                raise problem
+            if not more:
+                return
+            left = self._data[done:]
+
+    def _walk(self) -> int:
+        """Take all blocks of the chunk that are whole; return the offset of the first that is not."""
+        data = self._data
+        words = np.frombuffer(data, "<u4", len(data) // 4)
+        if self._reader.order == ">":
+            words = words.byteswap()
+        end = len(words)
+        at = 0
+        while at + 3 <= end:
+            stop, starts = self._packet_blocks(words, at)
+            if starts is not None:
+                self._take(words, starts)
+            at = stop
+            if at + 3 > end:
+                break
+            size = self._size(at)
+            if size > end - at:
+                break
+            order = self._reader.order
+            self._plain(4 * at, 4 * (at + size))
+            at += size
+            if self._reader.order != order:
+                words = words.byteswap()
+        return 4 * at
+
+    def _size(self, at: int) -> int:
+        """Return the size, in words, of the block at word `at`; of one that can not be, as much as shows it."""
+        kind, total, magic = struct.unpack_from(self._reader.order + "III", self._data, 4 * at)
+        if kind == 0x0A0D0D0A and magic != BYTE_ORDER_MAGIC:
+            total = int.from_bytes(total.to_bytes(4, "little"), "big")
+        return total // 4 if 12 <= total <= MAX_BLOCK and total % 4 == 0 else 3
+
+    def _packet_blocks(self, words: Words32, at: int) -> tuple[int, Ints | None]:
+        """Find packet blocks that follow each other from word `at` on: (the word behind them, where they begin)."""
+        found: list[Ints] = []
+        end = len(words)
+        guess = 64
+        look = words.data
+        while at + _LEAST <= end and look[at] == ENHANCED_PACKET:
+            total = look[at + 1]
+            size = total >> 2
+            if total & 3 or size < _LEAST or total > MAX_BLOCK:
+                break
+            count = min((end - at) // size, guess)
+            if not count:
+                break
+            rows = words[at : at + count * size].reshape(count, size)
+            alike = (rows[:, 0] == ENHANCED_PACKET) & (rows[:, 1] == total) & (rows[:, -1] == total)
+            run = count if alike.all() else int(alike.argmin())
+            if not run:
+                break
+            found.append(np.arange(at, at + run * size, size))
+            at += run * size
+            if run == count:
+                guess = min(guess * 8, 1 << 20)
+            elif run >= _SHORT_RUN:
+                guess = 64
+            else:
+                at, starts = _walked(look, at, _WALKED)
+                found.append(np.array(starts, np.int64))
+        if not found:
+            return at, None
+        return at, found[0] if len(found) == 1 else np.concatenate(found)
+
+    def _take(self, words: Words32, starts: Ints) -> None:
+        """Take packet blocks whose sizes are right."""
+        reader = self._reader
+        sides = reader.sides
+        sizes = words[starts + 1].astype(np.int64) >> 2
+        interface = words[starts + 2]
+        high = words[starts + 3]
+        low = words[starts + 4]
+        length = words[starts + 5].astype(np.int64)
+        options = _HEAD + ((length + 3) >> 2)
+        left = sizes - 1 - options
+        good = (left >= 0) & (interface < len(sides)) & (high < 1 << 29)  # else the time may be too large for us
+        flags = np.zeros(len(starts), np.uint32)
+        if left.any():
+            where = starts + np.where(good & (left > 0), options, 0)
+            first = words[where]
+            single = good & (left == 3) & (first == _FLAGS)
+            flags[single] = words[where[single] + 1]
+            nothing = (first & 0xFFFF) == 0
+            ended = np.zeros(len(starts), np.bool_)
+            ended[single] = (words[where[single] + 2] & 0xFFFF) == 0
+            good &= (left == 0) | ended | nothing
+            flags[~good] = 0
+            if reader.order == ">":
+                good &= left == 0  # there the two halves of a word stand the other way round
+        ticks = high.astype(np.int64) << 32 | low.astype(np.int64)
+        time_ns = self._times(ticks, interface, good)
+        side = (flags & 3).astype(np.int64)
+        side[side == 3] = 0
+        numbers_over_file = np.array([side.number for side in sides], np.int64)
+        interface = numbers_over_file[np.where(good, interface, 0)] if sides else interface.astype(np.int64)
+        columns = (time_ns, interface, side, 4 * (starts + _HEAD), length)
+        begin = 0
+        for odd in (*np.flatnonzero(~good).tolist(), len(starts)):
+            if odd > begin:
+                self._close_rows()
+                number = np.arange(reader.number + 1, reader.number + 1 + odd - begin)
+                self._parts.append((number, *(column[begin:odd] for column in columns)))
+                reader.number += odd - begin
+            if odd < len(starts):
+                self._plain(4 * int(starts[odd]), 4 * int(starts[odd] + sizes[odd]))
+            begin = odd + 1
+
+    def _times(self, ticks: Ints, interface: Words32, good: Flags) -> Ints:
+        """Return ns since 1970; clear in `good` what is to be calculated one by one."""
+        out = ticks
+        for index, side in enumerate(self._reader.sides):
+            if side.resolution == 9 and not side.offset_s:
+                continue
+            mine = interface == index
+            if not mine.any():
+                continue
+            if side.resolution > 9 or abs(side.offset_s) >= 1 << 31:
+                good &= ~mine
+                continue
+            factor = 10 ** (9 - side.resolution)
+            good &= ~(mine & (ticks > (1 << 62) // factor))
+            out = np.where(mine & good, ticks * factor + side.offset_s * 1_000_000_000, out)
+        return out
+
+    def _plain(self, start: int, stop: int) -> None:
+        """Have the plain reader read some of the chunk."""
+        source = Source(io.BytesIO(self._data[start:stop]), self._source.name)
+        source.offset = self._start + start
+        self._reader.source = source
+        try:
+            for packet in self._reader.packets():
+                self._rows.add(packet, len(self._data) + -len(self._data) % 4 + len(self._extra))
+                self._extra += packet.data + bytes(-len(packet.data) % 4)
+                if packet.comment:
+                    self._comments[packet.number] = packet.comment
+        finally:
+            known = self._interfaces
+            for side in self._reader.sides:
+                if side.number == len(known.link_type):
+                    known.link_type.append(side.link_type)
+                    known.description.append(side.description)
+
+    def _close_rows(self) -> None:
+        rows = self._rows
+        if rows.number:
+            columns = (rows.number, rows.time_ns, rows.interface, rows.side, rows.offset, rows.length)
+            self._parts.append(tuple(np.array(column, np.int64) for column in columns))
+            self._rows = Gathered()
+
+    def _collected(self) -> Packets:
+        """Return what was taken of the chunk."""
+        self._close_rows()
+        parts, comments = self._parts, self._comments
+        columns: tuple[Ints, ...] = (np.zeros(0, np.int64),) * 6
+        if parts:
+            columns = (
+                parts[0] if len(parts) == 1 else tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+            )
+        data = self._data
+        buffer: Bytes = np.frombuffer(data + bytes(-len(data) % 4) + bytes(self._extra) + bytes(SPARE), np.uint8)
+        self._parts, self._comments = [], {}
+        self._extra.clear()
+        number, time_ns, interface, side, offset, length = columns
+        return Packets(buffer, number, time_ns, interface, side.astype(np.uint8), offset, length, comments)
+
+
+def _walked(look: memoryview, at: int, most: int) -> tuple[int, list[int]]:
+    """Walk packet blocks one by one: (the word behind them, where they begin)."""
+    starts: list[int] = []
+    end = len(look)
+    while at + _LEAST <= end and len(starts) < most and look[at] == ENHANCED_PACKET:
+        total = look[at + 1]
+        stop = at + (total >> 2)
+        if total & 3 or total < 4 * _LEAST or total > MAX_BLOCK or stop > end or look[stop - 1] != total:
+            break
+        starts.append(at)
+        at = stop
+    return at, starts

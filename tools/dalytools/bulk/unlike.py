@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What the quick way does not read."""
+
+from __future__ import annotations
+
+
+class UnlikeError(Exception):
+    """A capture has what only the plain decoder reads; said in a few words."""
