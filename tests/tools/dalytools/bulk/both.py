@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from dalycapture.errors import CaptureError
 from dalycapture.reader import read_capture
-from dalyref.decoder import Decoder
+import dalyref.decoder
 from dalyref.options import Options
 from dalytools.bulk.blocks import CHUNK
+from dalytools.bulk.bus_frames import BOARD
+from dalytools.bulk.lots import Decoder
 from dalytools.bulk.packets import SIDES, Interfaces
 from dalytools.bulk.reading import read_columns
 from dalytools.bulk.records import DIALECTS, KINDS, Cutter
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dalyref.decoder import Decoded
+    from dalyref.values import Fields
+    from dalytools.bulk.lots import Batch
     from dalytools.bulk.records import Records
 
 Piece = tuple[int, int, str, object, bytes, int, str, str]
@@ -27,7 +31,7 @@ Piece = tuple[int, int, str, object, bytes, int, str, str]
 
 def plainly(path: Path, options: Options | None = None) -> tuple[list[Decoded], str]:
     """Decode with the reference decoder: the records, and what is wrong with the file."""
-    decoder = Decoder(options)
+    decoder = dalyref.decoder.Decoder(options)
     out: list[Decoded] = []
     problem = ""
     try:
@@ -83,3 +87,102 @@ def _pieces(records: Records) -> Iterator[Piece]:
             SIDES[int(records.side[row])],
             records.comments.get(number, ""),
         )
+
+
+LEFT_OUT = (
+    # What is said of exchanges, of bursts, and of what changed or contradicts.
+    "daly.request_in",
+    "daly.reply_in",
+    "daly.response_time",
+    "daly.retry",
+    "daly.unanswered",
+    "daly.unasked",
+    "daly.late_to",
+    "daly.other_board",
+    "daly.second_host",
+    "daly.write_result",
+    "daly.reassembled_in",
+    "daly.burst.missing",
+    "daly.burst.repeat",
+    "daly.burst.cut_off",
+    "daly.changed",
+    "daly.changed_from",
+    "daly.fault_raised",
+    "daly.fault_cleared",
+    "daly.contradiction",
+    "daly.contradicts",
+    # What stands in the frame's bytes, or in another column.
+    "daly.kind",
+    "daly.transport",
+    "daly.dialect",
+    "daly.start",
+    "daly.address",
+    "daly.data_id",
+    "daly.unknown_id",
+    "daly.length",
+    "daly.data",
+    "daly.checksum",
+    "daly.checksum.status",
+    "daly.write",
+    "daly.reserved",
+    "daly.undecoded",
+    "daly.foreign",
+    "daly.text_part",
+    "daly.balance.cell",
+    "daly.modbus.crc",
+    "daly.modbus.crc.status",
+    *(f"daly.cell.{number:02d}" for number in range(1, 49)),
+)
+
+
+def plain_fields(decoded: Iterable[Decoded]) -> list[tuple[int, Fields]]:
+    """What each record says, as far as the quick way says it too: (number, fields)."""
+    return [
+        (one.number, {name: value for name, value in one.fields.items() if name not in LEFT_OUT}) for one in decoded
+    ]
+
+
+def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = None) -> list[tuple[int, Fields]]:
+    """The same from the columns, put together again."""
+    interfaces = Interfaces()
+    used = options or Options()
+    cutter, decoder = Cutter(used, interfaces), Decoder(used, interfaces)
+    out: list[tuple[int, Fields]] = []
+    where: dict[tuple[int, int], Fields] = {}  # by number and time: fields of A5 frames
+
+    def take(batch: Batch) -> None:
+        records = batch.records
+        for row in range(len(records)):
+            fields: Fields = {}
+            number = int(records.number[row])
+            out.append((number, fields))
+            if row in batch.modbus:
+                fields.update(batch.modbus[row])
+                for name in LEFT_OUT:
+                    fields.pop(name, None)
+                fields["daly.modbus.address"], fields["daly.modbus.function"] = records.others[row][:2]
+            if direction := int(batch.direction[row]):
+                address = records.words[row].tobytes()[1]
+                fields["daly.direction"] = direction
+                if board := int(BOARD[address]):
+                    fields["daly.board"] = board
+                where[number, int(records.time_ns[row])] = fields
+        for table in (*batch.replies.values(), *batch.writes.values(), batch.cells, batch.sensors):
+            if table is not None:
+                for row in range(len(table)):
+                    fields = where[int(table.number[row]), int(table.time_ns[row])]
+                    for name, column in table.columns.items():
+                        value = column.value(row)
+                        if value is not None:
+                            assert name not in fields
+                            fields[name] = value
+        for number, time_ns, _, _, name, text in batch.texts:
+            where[number, time_ns][name] = text
+
+    try:
+        for packets in read_columns(path, interfaces, chunk=chunk):
+            take(decoder.take(cutter.take(packets)))
+    except CaptureError:
+        pass
+    take(decoder.finish(cutter.finish()))
+    return out

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Records to values, a lot at a time: directions, bursts, tables, and a table of typed columns for each data ID."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dalyref import cells, texts, writes
+from dalyref.addresses import REPLY, REQUEST
+from dalyref.kinds import Dialect
+from dalytools.bulk import payloads, runs, tables
+from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction
+from dalytools.bulk.columns import Column, Table
+from dalytools.bulk.directions import Directions
+from dalytools.bulk.modbus import Modbus
+from dalytools.bulk.newest import Newest
+from dalytools.bulk.records import DIALECTS, FRAME
+from dalytools.bulk.runs import Running
+from dalytools.bulk.unlike import UnlikeError
+
+if TYPE_CHECKING:
+    from dalyref.options import Options
+    from dalyref.values import Fields
+    from dalytools.bulk.arrays import Bytes, Ints
+    from dalytools.bulk.packets import Interfaces
+    from dalytools.bulk.records import Records
+
+_BUS_NAME: Final = re.compile(r"bus=([^\s,;]+)")
+_A5: Final = DIALECTS.index(Dialect.A5)
+_MOST_REMEMBERED: Final = 65536
+_PACK, _MOS, _STATUS = 0x90, 0x93, 0x94
+
+
+@dataclass(slots=True)
+class Batch:
+    """Some records of a capture, and the values in them."""
+
+    records: Records
+    direction: Bytes
+    """Of A5 frames: 1 request, 2 reply, 3 echo; of all else 0 (of Modbus: see `modbus`)."""
+    replies: dict[int, Table]
+    """What each data ID's replies say, a row each."""
+    writes: dict[int, Table]
+    """What requests that write would set, by data ID."""
+    cells: Table | None
+    """Whole tables of cell voltages, mV: with the batch in which they are complete."""
+    sensors: Table | None
+    """Whole tables of temperatures, C."""
+    texts: list[tuple[int, int, int, int, str, str]]
+    """Number, time, interface, address, field, text: whole texts, with the batch in which they are complete."""
+    modbus: dict[int, Fields]
+    """By row of `records`: what a Modbus frame says."""
+
+
+@dataclass(slots=True)
+class _Bus:
+    """What is remembered of one bus from lot to lot."""
+
+    directions: Directions
+    modbus: Modbus
+    running: Running = field(default_factory=Running)
+    before: BusFrames | None = None
+    """Frames that a request still to come may be an echo of, or follow."""
+    latest_ns: int = 0
+    """The latest beginning of a frame."""
+    now_ns: int = 0
+    """The latest beginning of a record."""
+    cells: Newest = field(default_factory=Newest)
+    sensors: Newest = field(default_factory=Newest)
+    state: Newest = field(default_factory=Newest)
+    """Byte 0 of the newest 93."""
+
+
+class Decoder:
+    """Decodes the records of one capture."""
+
+    def __init__(self, options: Options, interfaces: Interfaces) -> None:
+        self._options = options
+        self._interfaces = interfaces
+        self._wait_ns = options.limit_ns(options.reply)
+        self._burst_ns = options.limit_ns(options.burst)
+        self._buses: dict[int | str, _Bus] = {}
+        self._bus_of: list[_Bus] = []  # by interface
+        self._now_ns = 0
+        self._rows = 0  # records so far
+        self._pace = _Pace()
+
+    def take(self, records: Records) -> Batch:
+        """Take the next records; return them with their values. Raises UnlikeError where only the plain decoder will do."""
+        found = tables.Found()
+        batch = self._decode(records, found)
+        _whole(batch, found)
+        return batch
+
+    def finish(self, records: Records) -> Batch:
+        """Take the last records."""
+        found = tables.Found()
+        batch = self._decode(records, found)
+        for bus in self._buses.values():
+            tables.ended(bus.running, found)
+        _whole(batch, found)
+        return batch
+
+    def _decode(self, records: Records, found: tables.Found) -> Batch:
+        count = len(records)
+        batch = Batch(records, np.zeros(count, np.uint8), {}, {}, None, None, [], {})
+        if not count:
+            return batch
+        now_ns = np.maximum.accumulate(np.maximum(records.time_ns, self._now_ns))
+        self._now_ns = int(now_ns[-1])
+        self._pace.check(now_ns)
+        count_of = np.zeros(count, np.int64)
+        base_of = np.full(count, -1, np.int64)
+        for bus, rows in self._by_bus(records):
+            self._of_bus(bus, rows, batch, now_ns, found, count_of, base_of)
+        self._rows += count
+        self._tables(batch, count_of, base_of)
+        return batch
+
+    def _by_bus(self, records: Records) -> list[tuple[_Bus, Ints]]:
+        known = self._bus_of
+        for interface in range(len(known), len(self._interfaces.description)):
+            named = _BUS_NAME.search(self._interfaces.description[interface])
+            key = named[1] if named else interface
+            bus = self._buses.get(key)
+            if bus is None:
+                bus = self._buses[key] = _Bus(Directions(self._options), Modbus(self._options))
+            known.append(bus)
+        used = np.flatnonzero(np.bincount(records.interface)).tolist()
+        buses = {id(known[interface]): known[interface] for interface in used}
+        if len(buses) == 1:
+            return [(next(iter(buses.values())), np.arange(len(records)))]
+        numbers = {key: number for number, key in enumerate(buses)}
+        of_interface = np.zeros(len(known), np.int64)
+        for interface in used:
+            of_interface[interface] = numbers[id(known[interface])]
+        which = of_interface[records.interface]
+        return [(bus, np.flatnonzero(which == numbers[key])) for key, bus in buses.items()]
+
+    def _of_bus(
+        self,
+        bus: _Bus,
+        rows: Ints,
+        batch: Batch,
+        now_ns: Ints,
+        found: tables.Found,
+        count_of: Ints,
+        base_of: Ints,
+    ) -> None:
+        records = batch.records
+        bus_now_ns = np.maximum.accumulate(np.maximum(records.time_ns[rows], bus.now_ns))
+        bus.now_ns = int(bus_now_ns[-1])
+        good = records.kind[rows] == FRAME
+        if not good.all():
+            rows, bus_now_ns = rows[good], bus_now_ns[good]
+        latest_ns = np.maximum.accumulate(np.maximum(records.time_ns[rows], bus.latest_ns))
+        serial = records.dialect[rows] == _A5
+        if not serial.all():
+            for at in np.flatnonzero(~serial).tolist():
+                row = int(rows[at])
+                batch.modbus[row] = bus.modbus.take(records, row, int(latest_ns[at]))
+            bus.latest_ns = int(latest_ns[-1])
+            rows, bus_now_ns, latest_ns = rows[serial], bus_now_ns[serial], latest_ns[serial]
+        words = records.words[rows]
+        address = words.view(np.uint8).reshape(-1, 16)[:, 1]
+        frames = BusFrames(
+            rows,
+            records.time_ns[rows],
+            records.end_ns[rows],
+            latest_ns,
+            records.side[rows],
+            words,
+            first_direction(address),
+            np.zeros(len(rows), np.bool_),
+        )
+        if not len(frames):
+            return
+        bus.latest_ns = max(bus.latest_ns, int(latest_ns[-1]))
+        before = bus.before if bus.before is not None else frames.part(slice(0, 0))
+        known = len(before)
+        both = frames.behind(before)
+        bus.directions.find(both, known, bus.running)
+        frames.direction = both.direction[known:]
+        judged = runs.judge(frames, bus.running, self._burst_ns)
+        runs.check(frames, judged, bus.running, bus_now_ns, now_ns[rows], self._rows, self._burst_ns)
+        frames.answers[judged.at[judged.begins]] = True
+        batch.direction[rows] = frames.direction
+        self._counts(bus, frames, judged, records, found, count_of, base_of)
+        self._remember(bus, frames.behind(before))
+
+    def _counts(
+        self,
+        bus: _Bus,
+        frames: BusFrames,
+        judged: runs.Runs,
+        records: Records,
+        found: tables.Found,
+        count_of: Ints,
+        base_of: Ints,
+    ) -> None:
+        """Find how many cells and sensors each burst has, and its tables."""
+        reply = frames.direction == REPLY
+        data_id, address = frames.byte(2), frames.byte(1)
+        status = np.flatnonzero(reply & (data_id == _STATUS))
+        number_of_cells, number_of_sensors = frames.byte(4)[status], frames.byte(5)[status]
+        count = np.zeros(len(judged.at), np.int64)
+        ids = data_id[judged.at]
+        for kind, newest, told, most in (
+            (cells.CELLS, bus.cells, number_of_cells, cells.MOST_CELLS),
+            (cells.TEMPERATURES, bus.sensors, number_of_sensors, cells.MOST_SENSORS),
+        ):
+            valid = (told >= 1) & (told <= most)
+            mine = np.flatnonzero(ids == kind)
+            at = judged.at[mine]
+            known = newest.look(at, address[at], status[valid], address[status[valid]], told[valid])
+            count[mine] = np.maximum(known, 0)
+        row = frames.row[judged.at]
+        count_of[row] = count
+        base_of[row] = judged.base
+        if len(judged.at) and judged.first[0] < 0:
+            count[judged.first < 0] = bus.running.count
+        bus.running = tables.find(frames, judged, count, bus.running, records, found, self._rows)
+        packs = np.flatnonzero(reply & (data_id == _PACK))
+        mos = np.flatnonzero(reply & (data_id == _MOS))
+        state = bus.state.look(packs, address[packs], mos, address[mos], frames.byte(4)[mos])
+        count_of[frames.row[packs]] = state  # of a 90: the state beside it
+
+    def _remember(self, bus: _Bus, frames: BusFrames) -> None:
+        """Keep what a request still to come may belong to."""
+        ends = np.maximum.accumulate(frames.end_ns)
+        begin = int(np.searchsorted(ends, bus.latest_ns - self._wait_ns))
+        if len(frames) - begin > _MOST_REMEMBERED:
+            raise UnlikeError("thousands of frames in a second")
+        kept = frames.part(np.arange(begin, len(frames)))
+        kept.row = kept.row - (1 << 62)
+        bus.before = kept
+
+    @staticmethod
+    def _tables(batch: Batch, count_of: Ints, base_of: Ints) -> None:
+        records, direction = batch.records, batch.direction
+        raw = records.words.view(np.uint8).reshape(-1, 16)
+        replies = np.flatnonzero(direction == REPLY)
+        ids = raw[replies, 2]
+        for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
+            rows = replies[ids == data_id]
+            data = raw[rows, 4:12]
+            if data_id in cells.SLOTS:
+                columns = _parts(data_id, data, count_of[rows], base_of[rows])
+            elif data_id in texts.FIELDS:
+                columns = {"daly.frame_number": Column(data[:, 0])}
+            else:
+                columns = payloads.of_replies(data_id, data)
+                if data_id == _PACK:
+                    state = count_of[rows]
+                    columns["daly.pack.state"] = Column(np.maximum(state, 0).astype(np.uint8), state >= 0)
+            if columns:
+                batch.replies[data_id] = _table(records, rows, columns)
+        requests = np.flatnonzero(direction == REQUEST)
+        ids = raw[requests, 2]
+        for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
+            if writes.is_write(data_id):
+                rows = requests[ids == data_id]
+                columns = payloads.of_writes(data_id, raw[rows, 4:12])
+                batch.writes[data_id] = _table(records, rows, columns)
+
+
+class _Pace:
+    """Watches that no more records come within the time that some may be held than the plain decoder would hold."""
+
+    _STEP = 8192
+    _STEPS = 6
+    _HELD_NS = 12_000_000_000
+
+    def __init__(self) -> None:
+        self._marks: list[int] = []
+        self._left = 0
+
+    def check(self, now_ns: Ints) -> None:
+        """Take the latest beginning of a record on any bus, by record."""
+        at = self._STEP - 1 - self._left
+        self._marks += now_ns[at :: self._STEP].tolist()
+        self._left = (self._left + len(now_ns)) % self._STEP
+        for late, early in zip(self._marks[self._STEPS :], self._marks, strict=False):
+            if late - early <= self._HELD_NS:
+                raise UnlikeError("thousands of records in some seconds")
+        del self._marks[: -self._STEPS]
+
+
+def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Column]:
+    """Return the columns of single frames of 95 or 96. base: -1 where a frame is no part of any burst."""
+    slots = cells.SLOTS[data_id]
+    number = data[:, 0].astype(np.int64)
+    real = np.where(count > 0, np.clip(count - slots * (number - base), 0, slots), slots)
+    real = np.where(base < 0, 0, real)
+    if data_id == cells.CELLS:
+        values = data[:, 1:7:2].astype(np.int64) << 8 | data[:, 2:7:2]
+        name = "daly.cell.voltage"
+    else:
+        values = data[:, 1:8].astype(np.int64) - 40
+        name = "daly.temperature"
+    return {"daly.frame_number": Column(data[:, 0]), name: Column(values, length=real)}
+
+
+def _table(records: Records, rows: Ints, columns: dict[str, Column]) -> Table:
+    address = records.words.view(np.uint8).reshape(-1, 16)[rows, 1]
+    return Table(
+        records.number[rows], records.time_ns[rows], records.interface[rows], address, BOARD[address], columns
+    )
+
+
+def _whole(batch: Batch, found: tables.Found) -> None:
+    """Add the tables and texts that are complete."""
+    batch.cells = tables.table(cells.CELLS, found.rows[cells.CELLS], BOARD)
+    batch.sensors = tables.table(cells.TEMPERATURES, found.rows[cells.TEMPERATURES], BOARD)
+    batch.texts = [(*told, texts.FIELDS[data_id], text) for *told, data_id, text in sorted(found.texts)]
+
+

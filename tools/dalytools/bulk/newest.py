@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The newest value before a place, for each board by itself: counts of 94 for the bursts, the state of 93 for the 90."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints
+
+
+@dataclass(slots=True)
+class Newest:
+    """Remembers one quantity of each board over the lots of one bus. -1: not known."""
+
+    known: dict[int, int] = field(default_factory=dict[int, int])
+    """By address byte, at the end of the lot before."""
+
+    def look(self, at: Ints, address: Bytes, told_at: Ints, told_by: Bytes, told: Array) -> Ints:
+        """Return what was last told before each place `at` by the same address, and remember the lot's last.
+
+        told_at: rising places where something was told; told_by: by whom; told: what.
+        """
+        out = np.array([self.known.get(one, -1) for one in range(256)], np.int64)[address]
+        for one in np.unique(told_by).tolist():
+            mine = told_by == one
+            places, values = told_at[mine], told[mine].astype(np.int64)
+            asks: Flags = address == one
+            before = np.searchsorted(places, at[asks]) - 1
+            out[asks] = np.where(before >= 0, values[np.maximum(before, 0)], self.known.get(one, -1))
+            self.known[one] = int(values[-1])
+        return out

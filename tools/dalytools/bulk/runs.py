@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Bursts: which frames of 95, 96 and the texts belong together (docs/records.md, 8; dalyref.bursts).
+
+    replies   94 | 95/1  95/2  95/3 | 95/1  95/2 | 96/1 | 96/1      | begins, else it goes on with the reply before it
+
+Whether a reply goes on with a burst depends on the reply before it (frames that are skipped do not count) and, where both
+have the same number, on whether a request for the ID came between them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dalyref import bursts, cells
+from dalyref.addresses import REPLY, REQUEST
+from dalyref.file_order import LATE_NS
+from dalyref.options import NANO
+from dalytools.bulk.bus_frames import IS_BURST
+from dalytools.bulk.unlike import UnlikeError
+
+if TYPE_CHECKING:
+    from dalytools.bulk.arrays import Bytes, Flags, Ints
+    from dalytools.bulk.bus_frames import BusFrames
+
+_MOST_ROUNDS: Final = 8
+_MOST_ROWS: Final = 8192
+"""A burst spread over more records than this is left to the plain decoder, which gives up at some number of them."""
+_NEVER: Final = np.iinfo(np.int64).min // 2
+_CELLS_LAST, _SENSORS_LAST = cells.LAST_FRAME[cells.CELLS], cells.LAST_FRAME[cells.TEMPERATURES]
+
+
+@dataclass(slots=True)
+class Running:
+    """The reply before those at hand, and the burst it is of."""
+
+    data_id: int = -1
+    address: int = -1
+    number: int = -1
+    end_ns: int = _NEVER
+    asked: int = 0
+    """Requests for its ID since."""
+    base: int = 1
+    count: int = 0
+    """Cells or sensors known at the beginning of the burst, 0: not known."""
+    whole: bool = False
+    """No frame of it is missing so far."""
+    parts: dict[int, bytes] = field(default_factory=dict[int, bytes])
+    """What its frames carry behind their number, by number."""
+    first_row: int = 0
+    """Of its first frame, counted over the whole file."""
+    told: tuple[int, int, int] = (0, 0, 0)
+    """Of its last frame: packet, time, interface."""
+
+    @property
+    def is_burst(self) -> bool:
+        """Tell whether it is a frame of a burst."""
+        return self.data_id in bursts.IDS
+
+
+@dataclass(slots=True)
+class Runs:
+    """What the frames of one lot are, in the order of the file: a row for each reply that counts."""
+
+    at: Ints
+    """Where it stands in the lot."""
+    begins: Flags
+    number: Ints
+    """As sent, of frames of a burst; else -1."""
+    first: Ints
+    """Index, among these rows, of the first of its burst; -1: it goes on with the one that was running before the lot."""
+    base: Ints
+    """What the numbers of its burst are counted from: 0 or 1."""
+
+
+def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
+    """Tell what goes on with what. frames: their directions are known.
+
+    Raises UnlikeError where that depends on more than neighbours.
+    """
+    at = np.flatnonzero(frames.direction == REPLY)
+    data_id, address = frames.byte(2)[at], frames.byte(1)[at]
+    burst = IS_BURST[data_id]
+    number = np.where(burst, frames.byte(4)[at], -1).astype(np.int64)
+    keep = ~(burst & (number == bursts.INVALID))
+    is_cells, is_sensors = data_id == cells.CELLS, data_id == cells.TEMPERATURES
+    keep &= ~(is_cells & (number > _CELLS_LAST)) & ~(is_sensors & (number > _SENSORS_LAST))
+    doubtful = keep & ((is_cells & (number == _CELLS_LAST)) | (is_sensors & (number == _SENSORS_LAST)))
+    for _ in range(_MOST_ROUNDS):
+        kept = at if keep.all() else at[keep]
+        runs = _judge_kept(frames, kept, running, burst_ns)
+        if not doubtful.any():
+            return runs
+        # In a burst with base 0 the highest number that its ID can have is one lower.
+        beyond = np.flatnonzero(doubtful[keep] & (runs.base == 0) & ~runs.begins)
+        if not len(beyond):
+            return runs
+        _, one_a_run = np.unique(runs.first[beyond], return_index=True)
+        keep[np.flatnonzero(keep)[beyond[one_a_run]]] = False
+    raise UnlikeError("bursts numbered beyond their end again and again")
+
+
+def _judge_kept(frames: BusFrames, at: Ints, running: Running, burst_ns: int) -> Runs:
+    data_id, address = frames.byte(2)[at], frames.byte(1)[at]
+    burst = IS_BURST[data_id]
+    number = np.where(burst, frames.byte(4)[at], -1).astype(np.int64)
+    if not len(at):
+        none = np.zeros(0, np.int64)
+        return Runs(at, np.zeros(0, np.bool_), none, none, none)
+    end_ns = frames.end_ns[at]
+    goes_on = burst.copy()
+    goes_on[1:] &= (data_id[1:] == data_id[:-1]) & (address[1:] == address[:-1]) & (number[1:] >= number[:-1])
+    goes_on[1:] &= frames.start_ns[at[1:]] - end_ns[:-1] <= burst_ns
+    goes_on[0] &= (
+        int(data_id[0]) == running.data_id
+        and int(address[0]) == running.address
+        and int(number[0]) >= running.number
+        and int(frames.start_ns[at[0]]) - running.end_ns <= burst_ns
+    )
+    same = np.flatnonzero(goes_on[1:] & (number[1:] == number[:-1])) + 1
+    if len(same):
+        goes_on[same] &= ~_asked_between(frames, at[same - 1], at[same], data_id[same])
+    if goes_on[0] and int(number[0]) == running.number:
+        before = frames.part(slice(0, int(at[0])))
+        asked = (before.direction == REQUEST) & (before.byte(2) == running.data_id)
+        goes_on[0] = not (running.asked or asked.any())
+    index = np.arange(len(at))
+    first = np.maximum.accumulate(np.where(goes_on, -1, index))
+    base = np.where(number[np.maximum(first, 0)] == 0, 0, 1)
+    if first[0] < 0:
+        base[first < 0] = running.base
+    return Runs(at, ~goes_on, number, first, base)
+
+
+def _asked_between(frames: BusFrames, after: Ints, before: Ints, data_id: Bytes) -> Flags:
+    """Tell whether a request for the ID stands between two places."""
+    out = np.zeros(len(after), np.bool_)
+    requests = np.flatnonzero(frames.direction == REQUEST)
+    asks_for = frames.byte(2)[requests]
+    for one in np.unique(data_id).tolist():
+        mine = data_id == one
+        places = requests[asks_for == one]
+        out[mine] = np.searchsorted(places, before[mine]) > np.searchsorted(places, after[mine])
+    return out
+
+
+def check(
+    frames: BusFrames, runs: Runs, running: Running, bus_now_ns: Ints, now_ns: Ints, first_row: int, burst_ns: int
+) -> None:
+    """Raise UnlikeError where the plain decoder may have ended a burst by time that these rules go on with.
+
+    bus_now_ns, now_ns: the latest beginning of a record, on this bus and on any, by frame. first_row: number of the lot's
+    first record over the whole file.
+    """
+    later = np.flatnonzero(~runs.begins)
+    if not len(later):
+        return
+    at = runs.at[later]
+    before = np.where(later > 0, frames.end_ns[runs.at[np.maximum(later - 1, 0)]], running.end_ns)
+    over = (bus_now_ns[at] - before > burst_ns + NANO // 2) | (now_ns[at] - before > burst_ns + LATE_NS)
+    if over.any():
+        raise UnlikeError("time stamps that go back within a burst")
+    first = runs.first[later]
+    begun = np.where(first >= 0, first_row + frames.row[runs.at[np.maximum(first, 0)]], running.first_row)
+    if (first_row + frames.row[at] - begun > _MOST_ROWS).any():
+        raise UnlikeError("a burst spread over thousands of records")

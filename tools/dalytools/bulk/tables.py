@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Whole tables of cells and sensors, and texts, of the bursts that carry them (docs/records.md, 8).
+
+    95/1 95/2 95/3 95/4 95/5 95/6      16 cells known: the table stands in 95/6, all at once
+    95/1 95/1 95/2 ..                  repeats, bursts that began in the lot before, texts: one by one
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from dalyref import cells, texts
+from dalytools.bulk.columns import Column, Table
+from dalytools.bulk.runs import Running
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dalytools.bulk.arrays import Array, Bytes, Ints
+    from dalytools.bulk.bus_frames import BusFrames
+    from dalytools.bulk.records import Records
+    from dalytools.bulk.runs import Runs
+
+_WIDTH: Final = {cells.CELLS: cells.MOST_CELLS, cells.TEMPERATURES: cells.MOST_SENSORS}
+FIELDS: Final = {
+    cells.CELLS: ("daly.cells.", "voltage"),
+    cells.TEMPERATURES: ("daly.sensors.", "temperature"),
+}
+
+
+@dataclass(slots=True)
+class Rows:
+    """Tables that were found, of one ID: cells in mV, or sensors' bytes as sent."""
+
+    number: list[Ints] = field(default_factory=list["Ints"])
+    time_ns: list[Ints] = field(default_factory=list["Ints"])
+    interface: list[Ints] = field(default_factory=list["Ints"])
+    address: list[Ints] = field(default_factory=list["Ints"])
+    length: list[Ints] = field(default_factory=list["Ints"])
+    slots: list[Array] = field(default_factory=list["Array"])
+
+    def add(self, told: Sequence[Ints], address: Ints, length: Ints, slots: Array) -> None:
+        """Take some rows; told: number, time and interface of their records. slots: rows x width."""
+        number, time_ns, interface = told
+        self.number.append(number)
+        self.time_ns.append(time_ns)
+        self.interface.append(interface)
+        self.address.append(address)
+        self.length.append(length)
+        self.slots.append(slots)
+
+
+@dataclass(slots=True)
+class Found:
+    """What the bursts of a lot carry."""
+
+    rows: dict[int, Rows] = field(default_factory=lambda: {data_id: Rows() for data_id in _WIDTH})
+    """By data ID."""
+    texts: list[tuple[int, int, int, int, int, str]] = field(
+        default_factory=list[tuple[int, int, int, int, int, str]]
+    )
+    """Number, time, interface, address, data ID, text."""
+
+
+def find(
+    frames: BusFrames, runs: Runs, count: Ints, running: Running, records: Records, found: Found, first_row: int
+) -> Running:
+    """Find what is complete in a lot; return the burst that is still running at its end.
+
+    count: of cells or sensors at the beginning of each reply's burst, 0: not known.
+    """
+    at = runs.at
+    if not len(at):
+        asked = int(((frames.direction == 1) & (frames.byte(2) == running.data_id)).sum())
+        return replace(running, asked=running.asked + asked)
+    data_id = frames.byte(2)[at]
+    begins = np.flatnonzero(runs.begins)
+    first_begin = int(begins[0]) if len(begins) else len(at)
+    # The burst that was running goes on; when another reply begins something, it has ended.
+    current = running
+    if first_begin:
+        current = _one_by_one(frames, runs, range(first_begin), current, records, found)
+    if len(begins):
+        ended(current, found)
+        for kind in _WIDTH:
+            _at_once(frames, runs, count, kind, records, found)
+        odd = _odd(runs, data_id)
+        bounds = np.append(begins, len(at)).tolist()
+        for index in odd.tolist():
+            members = range(bounds[index], bounds[index + 1])
+            begun = _begun(frames, runs, members[0], int(count[members[0]]), first_row)
+            last = _one_by_one(frames, runs, members, begun, records, found)
+            if index + 1 < len(begins):
+                ended(last, found)
+        members = range(bounds[-2], len(at))
+        current = _begun(frames, runs, members[0], int(count[members[0]]), first_row)
+        # What is told of it at once was told above.
+        current = _one_by_one(frames, runs, members, current, records, Found())
+    last_at = int(at[-1])
+    later = frames.part(slice(last_at + 1, None))
+    current.asked = int(((later.direction == 1) & (later.byte(2) == current.data_id)).sum())
+    return current
+
+
+def _odd(runs: Runs, data_id: Bytes) -> Ints:
+    """Return which bursts, by their order, are to be taken one by one."""
+    begins = np.flatnonzero(runs.begins)
+    ids = data_id[begins]
+    text = np.isin(ids, list(texts.FIELDS))
+    tabled = np.isin(ids, list(_WIDTH))
+    repeats = _repeated(runs)[begins]
+    return np.flatnonzero(text | (tabled & repeats))
+
+
+def _begun(frames: BusFrames, runs: Runs, index: int, count: int, first_row: int) -> Running:
+    place = int(runs.at[index])
+    data = frames.bytes_of(place)
+    return Running(
+        data_id=data[2],
+        address=data[1],
+        base=int(runs.base[index]),
+        count=count,
+        whole=True,
+        number=int(runs.base[index]) - 1,
+        first_row=first_row + int(frames.row[place]),
+    )
+
+
+def _one_by_one(
+    frames: BusFrames, runs: Runs, members: range, burst: Running, records: Records, found: Found
+) -> Running:
+    """Take the frames of one burst; tell of its table where a count is known."""
+    per_frame = cells.SLOTS.get(burst.data_id, 0)
+    for index in members:
+        place = int(runs.at[index])
+        row = int(frames.row[place])
+        data = frames.bytes_of(place)
+        burst.end_ns = int(frames.end_ns[place])
+        burst.told = (int(records.number[row]), int(records.time_ns[row]), int(records.interface[row]))
+        number = int(runs.number[index])
+        if number < 0:
+            burst.number = number
+            continue
+        burst.whole = burst.whole and number <= burst.number + 1
+        burst.number = number
+        burst.parts[number] = data[5:12]
+        first = per_frame * (number - burst.base) + 1
+        if burst.count and burst.whole and first <= burst.count < first + per_frame:
+            _tell(burst, found)
+    return burst
+
+
+def _tell(burst: Running, found: Found) -> None:
+    """Tell of the table of one burst."""
+    whole = [burst.parts[number] for number in sorted(burst.parts)]
+    slots: list[int] = []
+    for part in whole:
+        slots += cells.cells(b"\0" + part) if burst.data_id == cells.CELLS else part
+    slots = slots[: burst.count] if burst.count else slots
+    width = _WIDTH[burst.data_id]
+    row = np.zeros((1, width), np.int64)
+    row[0, : len(slots)] = slots
+    told = [np.array([one], np.int64) for one in burst.told]
+    found.rows[burst.data_id].add(told, np.array([burst.address]), np.array([len(slots)]), row)
+
+
+def ended(burst: Running, found: Found) -> None:
+    """Tell of what is known only when a burst has ended."""
+    if not burst.parts or not burst.whole or burst.count:
+        return
+    if burst.data_id in _WIDTH:
+        _tell(burst, found)
+    elif burst.data_id in texts.FIELDS:
+        text = texts.whole(burst.parts)
+        if text:
+            found.texts.append((*burst.told, burst.address, burst.data_id, text))
+
+
+def _at_once(frames: BusFrames, runs: Runs, count: Ints, data_id: int, records: Records, found: Found) -> None:
+    """Find the tables of bursts that began in this lot and have no repeats, but for the last that may go on."""
+    at, number = runs.at, runs.number
+    per_frame, width = cells.SLOTS[data_id], _WIDTH[data_id]
+    mine = (frames.byte(2)[at] == data_id) & (runs.first >= 0)
+    index = np.flatnonzero(mine)
+    if not len(index):
+        return
+    first = runs.first[index]
+    step = number[index] - runs.base[index]
+    # Frame number n is the n-th of its burst, so none before it is missing or came twice.
+    in_order = index - first == step
+    begin = per_frame * step + 1
+    known = count[first]
+    complete = (known > 0) & (begin <= known) & (known < begin + per_frame)
+    # Without a count the last of the burst carries the table; whether the lot's last burst has ended is not known yet.
+    last = np.ones(len(at), np.bool_)
+    last[:-1] = runs.begins[1:]
+    last[-1] = False
+    complete |= (known == 0) & last[index]
+    which = np.flatnonzero(in_order & complete & ~_repeated(runs)[first])
+    if not len(which):
+        return
+    length = np.where(known[which] > 0, known[which], per_frame * (step[which] + 1))
+    raw = frames.words.view(np.uint8).reshape(-1, 16)
+    frames_each = width // per_frame
+    places = np.minimum(first[which][:, None] + np.arange(frames_each), index[which][:, None])
+    payload = raw[at[places], 5:12]
+    if data_id == cells.CELLS:
+        slots = (payload[:, :, 0:6:2].astype(np.int64) << 8 | payload[:, :, 1:6:2]).reshape(len(which), width)
+    else:
+        slots = payload.reshape(len(which), width).astype(np.int64)
+    slots[np.arange(width) >= length[:, None]] = 0
+    row = frames.row[at[index[which]]]
+    told = (records.number[row], records.time_ns[row], records.interface[row])
+    address = raw[at[index[which]], 1].astype(np.int64)
+    found.rows[data_id].add(told, address, length, slots)
+
+
+def _repeated(runs: Runs) -> Array:
+    """Tell which bursts, by the index of their first frame, are taken one by one for a repeat in them."""
+    out = np.zeros(len(runs.at), np.bool_)
+    within = np.flatnonzero(~runs.begins[1:] & (runs.number[1:] == runs.number[:-1])) + 1
+    out[runs.first[within[runs.first[within] >= 0]]] = True
+    return out
+
+
+def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
+    """Return the tables found as columns: all slots, how many, lowest and highest and which, average, spread."""
+    if not rows.number:
+        return None
+    number, time_ns, interface, address, length = (
+        np.concatenate(column) for column in (rows.number, rows.time_ns, rows.interface, rows.address, rows.length)
+    )
+    slots = np.concatenate(rows.slots)
+    order = np.argsort(number, kind="stable")
+    number, time_ns, interface, address, length, slots = (
+        column[order] for column in (number, time_ns, interface, address, length, slots)
+    )
+    prefix, name = FIELDS[data_id]
+    there = np.arange(slots.shape[1]) < length[:, None]
+    shown = slots
+    if data_id == cells.TEMPERATURES:
+        shown = slots - 40
+        there &= (slots != 0x00) & (slots != 0xFF)  # no sensor (dalyref.cells.is_there)
+    some = there.any(1)
+    low_first = np.where(there, slots, 1 << 20).argmin(1)
+    high_first = np.where(there, slots, -1).argmax(1)
+    each = np.arange(len(slots))
+    low, high = slots[each, low_first], slots[each, high_first]
+    how_many = np.maximum(there.sum(1), 1)
+    average = np.where(there, slots, 0).sum(1) / how_many
+    zero = 40 if data_id == cells.TEMPERATURES else 0
+    valid = None if some.all() else some
+    byte_address = address.astype(np.uint8)
+    return Table(
+        number,
+        time_ns,
+        interface,
+        byte_address,
+        board[byte_address],
+        {
+            prefix + name: Column(shown, length=length),
+            prefix + "count": Column(length),
+            prefix + "min": Column(low - zero, valid),
+            prefix + "min_number": Column(low_first + 1, valid),
+            prefix + "max": Column(high - zero, valid),
+            prefix + "max_number": Column(high_first + 1, valid),
+            prefix + "average": Column(average - zero, valid),
+            prefix + "spread": Column(high - low, valid),
+        },
+    )
