@@ -150,11 +150,18 @@ class BlockReader:
         """Take packet blocks whose sizes are right."""
         reader = self._reader
         sides = reader.sides
-        sizes = words[starts + 1].astype(np.int64) >> 2
-        interface = words[starts + 2]
-        high = words[starts + 3]
-        low = words[starts + 4]
-        length = words[starts + 5].astype(np.int64)
+        first, size = int(starts[0]), int(words[starts[0] + 1]) >> 2
+        last = int(starts[-1])
+        alike = int(words[last + 1]) >> 2 == size and (starts[1:] - starts[:-1] == size).all()
+        if alike:
+            block = words[first : last + size].reshape(-1, size)
+        else:
+            block = words[starts[:, None] + np.arange(6)]
+        sizes = block[:, 1].astype(np.int64) >> 2
+        interface = block[:, 2]
+        high = block[:, 3]
+        low = block[:, 4]
+        length = block[:, 5].astype(np.int64)
         options = _HEAD + ((length + 3) >> 2)
         left = sizes - 1 - options
         good = (left >= 0) & (interface < len(sides)) & (high < 1 << 29)  # else the time may be too large for us

@@ -12,7 +12,6 @@ from dalyref import addresses, bursts
 from dalytools.bulk.frames import FIVE
 
 if TYPE_CHECKING:
-    from dalyref.message import Message
     from dalytools.bulk.arrays import Bytes, Flags, Ints, Words
 
 IS_BURST: Final = np.array([data_id in bursts.IDS for data_id in range(256)], np.bool_)
@@ -85,9 +84,18 @@ class BusFrames:
         return self.words[at].tobytes()[:13]
 
 
+def risen(values: Ints, least: int) -> Ints:
+    """Return the largest up to each place, and `least` where that is larger."""
+    if not len(values) or (values[0] >= least and (values[1:] >= values[:-1]).all()):
+        return values
+    return np.maximum.accumulate(np.maximum(values, least))
+
+
+def rows_of(words: Words, which: Ints) -> Bytes:
+    """Return the sixteen bytes of some frames."""
+    return words.view("V16")[:, 0][which].view(np.uint8).reshape(*which.shape, 16)
+
+
 def first_direction(address: Bytes) -> Bytes:
     """Return request or reply by the address byte: an echo is a request so far."""
     return np.where(address >= addresses.FIRST_HOST, addresses.REQUEST, addresses.REPLY).astype(np.uint8)
-
-
-__all__ = ["BOARD", "IS_BURST", "ONLY", "BusFrames", "Message", "first_direction"]

@@ -19,7 +19,7 @@ from dalyref import bursts, cells
 from dalyref.addresses import ECHO, REPLY, REQUEST
 from dalyref.exchange import Exchange
 from dalyref.message import from_serial
-from dalytools.bulk.bus_frames import BOARD, IS_BURST, ONLY
+from dalytools.bulk.bus_frames import BOARD, IS_BURST, ONLY, risen
 from dalytools.bulk.packets import SIDES
 from dalytools.bulk.runs import Running, judge
 from dalytools.bulk.unlike import UnlikeError
@@ -64,7 +64,7 @@ class Directions:
             return at[:0], at[:0]
         first, second = (half[at] for half in frames.identity())
         start_ns = frames.start_ns[at]
-        latest_end_ns = np.maximum.accumulate(frames.end_ns[at])
+        latest_end_ns = risen(frames.end_ns[at], 0)
         window_ns = self._wait_ns if frames.side[at].any() else self._echo_ns
         before = np.full(len(at), -1, np.int64)
         step = 1
@@ -135,7 +135,7 @@ class Directions:
         answers[known:] = False
         answers[known + judged.at[judged.begins]] = True
         first, last = int(open_questions[0]), int(open_questions[-1])
-        ends = np.maximum.accumulate(frames.end_ns)
+        ends = risen(frames.end_ns, 0)
         begin = int(np.searchsorted(ends, int(frames.latest_ns[first]) - self._wait_ns))
         book = Exchange[None](self._options)
         follow = _Follow(fresh, running, first - known, self._burst_ns)

@@ -54,12 +54,18 @@ def _classes() -> bytes:
     return bytes(table)
 
 
+def _masks(first: int, behind: int, bits: int) -> tuple[np.uint64, np.uint64]:
+    """Return both words of a row with `bits` in some of its bytes."""
+    row = bytes(bits if first <= at < behind else 0 for at in range(16))
+    return _U(int.from_bytes(row[:8], "little")), _U(int.from_bytes(row[8:], "little"))
+
+
 _CLASSES: Final = _classes()
 # Of the sixteen bytes of a row, counted from its first: where a pair can begin (1 to 11), where an A5 with an 08 three
 # behind it (1 to 9), and where an A5 that is cut off by the frame's end (10 to 12).
-_PAIRS: Final = np.array([0 < at < 12 for at in range(16)], np.uint8) * np.uint8(_REPLY | _REQUEST)
-_STARTS: Final = np.array([0 < at < 10 for at in range(16)], np.uint8) * np.uint8(_A5)
-_LATE: Final = np.array([9 < at < 13 for at in range(16)], np.uint8) * np.uint8(_A5)
+_PAIRS: Final = _masks(1, 12, _REPLY | _REQUEST)
+_STARTS: Final = _masks(1, 10, _A5)
+_LATE: Final = _masks(10, 13, _A5)
 
 
 def gather(buffer: Bytes, offset: Ints) -> Words:
@@ -83,11 +89,16 @@ def ambiguous(words: Words) -> Flags:
     raw = np.frombuffer(words.tobytes().translate(_CLASSES) + bytes(8), np.uint8)
     size = words.size * 8
     here = raw[:size]
-    found = here & (raw[1 : size + 1] >> 4) & np.tile(_PAIRS, len(words))
-    found |= here & (raw[3 : size + 3] >> 1) & np.tile(_STARTS, len(words))
-    found |= here & np.tile(_LATE, len(words))
-    wide = found.view(_U).reshape(len(words), 2)
-    return (wide[:, 0] | wide[:, 1]) != 0
+    out = np.zeros(len(words), _U)
+    for found, masks in (
+        (here & (raw[1 : size + 1] >> 4), _PAIRS),
+        (here & (raw[3 : size + 3] >> 1), _STARTS),
+        (here, _LATE),
+    ):
+        wide = found.view(_U).reshape(len(words), 2)
+        out |= wide[:, 0] & masks[0]
+        out |= wide[:, 1] & masks[1]
+    return out != 0
 
 
 class Stands(Enum):

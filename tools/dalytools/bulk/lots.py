@@ -13,7 +13,7 @@ from dalyref import cells, texts, writes
 from dalyref.addresses import REPLY, REQUEST
 from dalyref.kinds import Dialect
 from dalytools.bulk import payloads, runs, tables
-from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction
+from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction, risen, rows_of
 from dalytools.bulk.columns import Column, Table
 from dalytools.bulk.directions import Directions
 from dalytools.bulk.modbus import Modbus
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 _BUS_NAME: Final = re.compile(r"bus=([^\s,;]+)")
 _A5: Final = DIALECTS.index(Dialect.A5)
 _MOST_REMEMBERED: Final = 65536
+_TAIL: Final = 1024
+"""So many frames are nearly always more than come in a second."""
 _PACK, _MOS, _STATUS = 0x90, 0x93, 0x94
 
 
@@ -110,7 +112,7 @@ class Decoder:
         batch = Batch(records, np.zeros(count, np.uint8), {}, {}, None, None, [], {})
         if not count:
             return batch
-        now_ns = np.maximum.accumulate(np.maximum(records.time_ns, self._now_ns))
+        now_ns = risen(records.time_ns, self._now_ns)
         self._now_ns = int(now_ns[-1])
         self._pace.check(now_ns)
         count_of = np.zeros(count, np.int64)
@@ -152,27 +154,31 @@ class Decoder:
         base_of: Ints,
     ) -> None:
         records = batch.records
-        bus_now_ns = np.maximum.accumulate(np.maximum(records.time_ns[rows], bus.now_ns))
+        everything = len(rows) == len(records)
+        here: slice | Ints = slice(None) if everything else rows
+        bus_now_ns = risen(records.time_ns[here], bus.now_ns)
         bus.now_ns = int(bus_now_ns[-1])
-        good = records.kind[rows] == FRAME
+        good = records.kind[here] == FRAME
         if not good.all():
             rows, bus_now_ns = rows[good], bus_now_ns[good]
-        latest_ns = np.maximum.accumulate(np.maximum(records.time_ns[rows], bus.latest_ns))
-        serial = records.dialect[rows] == _A5
+            here = rows
+        latest_ns = risen(records.time_ns[here], bus.latest_ns)
+        serial = records.dialect[here] == _A5
         if not serial.all():
             for at in np.flatnonzero(~serial).tolist():
                 row = int(rows[at])
                 batch.modbus[row] = bus.modbus.take(records, row, int(latest_ns[at]))
             bus.latest_ns = int(latest_ns[-1])
             rows, bus_now_ns, latest_ns = rows[serial], bus_now_ns[serial], latest_ns[serial]
-        words = records.words[rows]
+            here = rows
+        words = records.words[here]
         address = words.view(np.uint8).reshape(-1, 16)[:, 1]
         frames = BusFrames(
             rows,
-            records.time_ns[rows],
-            records.end_ns[rows],
+            records.time_ns[here],
+            records.end_ns[here],
             latest_ns,
-            records.side[rows],
+            records.side[here],
             words,
             first_direction(address),
             np.zeros(len(rows), np.bool_),
@@ -186,11 +192,11 @@ class Decoder:
         bus.directions.find(both, known, bus.running)
         frames.direction = both.direction[known:]
         judged = runs.judge(frames, bus.running, self._burst_ns)
-        runs.check(frames, judged, bus.running, bus_now_ns, now_ns[rows], self._rows, self._burst_ns)
+        runs.check(frames, judged, bus.running, bus_now_ns, now_ns[here], self._rows, self._burst_ns)
         frames.answers[judged.at[judged.begins]] = True
-        batch.direction[rows] = frames.direction
+        batch.direction[here] = frames.direction
         self._counts(bus, frames, judged, records, found, count_of, base_of)
-        self._remember(bus, frames.behind(before))
+        self._remember(bus, frames, before)
 
     def _counts(
         self,
@@ -229,10 +235,14 @@ class Decoder:
         state = bus.state.look(packs, address[packs], mos, address[mos], frames.byte(4)[mos])
         count_of[frames.row[packs]] = state  # of a 90: the state beside it
 
-    def _remember(self, bus: _Bus, frames: BusFrames) -> None:
+    def _remember(self, bus: _Bus, frames: BusFrames, before: BusFrames) -> None:
         """Keep what a request still to come may belong to."""
-        ends = np.maximum.accumulate(frames.end_ns)
-        begin = int(np.searchsorted(ends, bus.latest_ns - self._wait_ns))
+        since_ns = bus.latest_ns - self._wait_ns
+        if len(frames) > _TAIL and frames.end_ns[:-_TAIL].max() < since_ns:
+            frames = frames.part(slice(-_TAIL, None))
+        else:
+            frames = frames.behind(before)
+        begin = int(np.searchsorted(risen(frames.end_ns, 0), since_ns))
         if len(frames) - begin > _MOST_REMEMBERED:
             raise UnlikeError("thousands of frames in a second")
         kept = frames.part(np.arange(begin, len(frames)))
@@ -247,7 +257,7 @@ class Decoder:
         ids = raw[replies, 2]
         for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
             rows = replies[ids == data_id]
-            data = raw[rows, 4:12]
+            data = rows_of(records.words, rows)[:, 4:12]
             if data_id in cells.SLOTS:
                 columns = _parts(data_id, data, count_of[rows], base_of[rows])
             elif data_id in texts.FIELDS:
@@ -264,7 +274,7 @@ class Decoder:
         for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
             if writes.is_write(data_id):
                 rows = requests[ids == data_id]
-                columns = payloads.of_writes(data_id, raw[rows, 4:12])
+                columns = payloads.of_writes(data_id, rows_of(records.words, rows)[:, 4:12])
                 batch.writes[data_id] = _table(records, rows, columns)
 
 

@@ -91,19 +91,16 @@ def _balance(data: Bytes) -> Columns:
 
 
 def _faults(data: Bytes) -> Columns:
-    columns: Columns = {}
-    count = np.zeros(len(data), np.int64)
-    for byte, names in enumerate(faults.TABLE):
-        for bit, name in enumerate(names):
-            found = data[:, byte] & np.uint8(1 << bit) != 0
-            columns[faults.PREFIX + name] = Column(found)
-            if (byte, bit) not in {(6, 4), (6, 5)}:  # states, not among the paper's faults
-                count += found
+    bits = np.ascontiguousarray(np.unpackbits(data, axis=1, bitorder="little").T).view(np.bool_)
+    columns = {faults.PREFIX + name: Column(bits[at]) for at, name in _FAULTS}
     columns["daly.fault_code"] = Column(data[:, 7])
-    columns["daly.fault_count"] = Column(count)
+    columns["daly.fault_count"] = Column(bits[_COUNTED].sum(0))
     return columns
 
 
+_FAULTS: Final = [(8 * byte + bit, name) for byte, row in enumerate(faults.TABLE) for bit, name in enumerate(row)]
+_COUNTED: Final = [at for at, _ in _FAULTS if at not in {52, 53}]
+"""Without bits 4 and 5 of byte 6, which are not among the paper's faults."""
 _AT_ONCE: Final[dict[int, Callable[[Bytes], Columns]]] = {
     0x90: _pack,
     0x91: _cell_extremes,

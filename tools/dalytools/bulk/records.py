@@ -27,7 +27,7 @@ from dalytools.bulk.packets import SIDES
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from dalyref.options import Options
     from dalytools.bulk.arrays import Array, Bytes, Flags, Ints, Words
@@ -220,11 +220,21 @@ class _Streams:
 
     def __init__(self, packets: Packets) -> None:
         self._packets = packets
-        self._rows: dict[tuple[int, int], list[int]] = {}
+        self._rows: dict[tuple[int, int], Sequence[int]] = {}
+        interface, side = packets.interface, packets.side
+        self._one = bool(
+            len(packets)
+            and packets.length.all()
+            and (interface == interface[0]).all()
+            and (side == side[0]).all()
+        )
 
     def present(self) -> list[tuple[int, int]]:
         """Return all streams: (interface, side)."""
-        present = np.bincount(self._packets.interface << 2 | self._packets.side)
+        packets = self._packets
+        if self._one:
+            return [(int(packets.interface[0]), int(packets.side[0]))]
+        present = np.bincount(packets.interface << 2 | packets.side)
         return [(key >> 2, key & 3) for key in np.flatnonzero(present).tolist()]
 
     def before(self, key: tuple[int, int], row: int) -> int:
@@ -239,12 +249,15 @@ class _Streams:
         at = bisect_right(rows, row)
         return rows[at] if at < len(rows) else -1
 
-    def _of(self, key: tuple[int, int]) -> list[int]:
+    def _of(self, key: tuple[int, int]) -> Sequence[int]:
+        if self._one:
+            return range(len(self._packets))
         rows = self._rows.get(key)
         if rows is None:
             packets = self._packets
             mine = (packets.interface == key[0]) & (packets.side == key[1]) & (packets.length > 0)
-            rows = self._rows[key] = np.flatnonzero(mine).tolist()
+            found: list[int] = np.flatnonzero(mine).tolist()
+            rows = self._rows[key] = found
         return rows
 
 

@@ -22,7 +22,7 @@ from dalytools.bulk.bus_frames import IS_BURST
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
-    from dalytools.bulk.arrays import Bytes, Flags, Ints
+    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints
     from dalytools.bulk.bus_frames import BusFrames
 
 _MOST_ROUNDS: Final = 8
@@ -81,17 +81,18 @@ def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
     Raises UnlikeError where that depends on more than neighbours.
     """
     at = np.flatnonzero(frames.direction == REPLY)
-    data_id, address = frames.byte(2)[at], frames.byte(1)[at]
-    burst = IS_BURST[data_id]
-    number = np.where(burst, frames.byte(4)[at], -1).astype(np.int64)
-    keep = ~(burst & (number == bursts.INVALID))
-    is_cells, is_sensors = data_id == cells.CELLS, data_id == cells.TEMPERATURES
-    keep &= ~(is_cells & (number > _CELLS_LAST)) & ~(is_sensors & (number > _SENSORS_LAST))
+    kept = _Kept(at, frames.byte(2)[at], frames.byte(1)[at], frames.byte(4)[at])
+    burst = IS_BURST[kept.data_id]
+    number = kept.number
+    keep = ~burst | (number != bursts.INVALID)
+    is_cells, is_sensors = kept.data_id == cells.CELLS, kept.data_id == cells.TEMPERATURES
+    keep &= ~((is_cells & (number > _CELLS_LAST)) | (is_sensors & (number > _SENSORS_LAST)))
     doubtful = keep & ((is_cells & (number == _CELLS_LAST)) | (is_sensors & (number == _SENSORS_LAST)))
+    kept.number = np.where(burst, number, -1).astype(np.int64)
+    some_doubtful = doubtful.any()
     for _ in range(_MOST_ROUNDS):
-        kept = at if keep.all() else at[keep]
-        runs = _judge_kept(frames, kept, running, burst_ns)
-        if not doubtful.any():
+        runs = _judge_kept(frames, kept if keep.all() else kept.part(keep), running, burst_ns)
+        if not some_doubtful:
             return runs
         # In a burst with base 0 the highest number that its ID can have is one lower.
         beyond = np.flatnonzero(doubtful[keep] & (runs.base == 0) & ~runs.begins)
@@ -102,15 +103,27 @@ def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
     raise UnlikeError("bursts numbered beyond their end again and again")
 
 
-def _judge_kept(frames: BusFrames, at: Ints, running: Running, burst_ns: int) -> Runs:
-    data_id, address = frames.byte(2)[at], frames.byte(1)[at]
-    burst = IS_BURST[data_id]
-    number = np.where(burst, frames.byte(4)[at], -1).astype(np.int64)
+@dataclass(slots=True)
+class _Kept:
+    """Replies, without those that are no part of anything."""
+
+    at: Ints
+    data_id: Bytes
+    address: Bytes
+    number: Array
+
+    def part(self, which: Flags) -> _Kept:
+        return _Kept(self.at[which], self.data_id[which], self.address[which], self.number[which])
+
+
+def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, burst_ns: int) -> Runs:
+    at, data_id, address, number = kept.at, kept.data_id, kept.address, kept.number
     if not len(at):
         none = np.zeros(0, np.int64)
         return Runs(at, np.zeros(0, np.bool_), none, none, none)
+    burst = number >= 0
     end_ns = frames.end_ns[at]
-    goes_on = burst.copy()
+    goes_on = burst
     goes_on[1:] &= (data_id[1:] == data_id[:-1]) & (address[1:] == address[:-1]) & (number[1:] >= number[:-1])
     goes_on[1:] &= frames.start_ns[at[1:]] - end_ns[:-1] <= burst_ns
     goes_on[0] &= (
@@ -158,11 +171,13 @@ def check(
     if not len(later):
         return
     at = runs.at[later]
-    before = np.where(later > 0, frames.end_ns[runs.at[np.maximum(later - 1, 0)]], running.end_ns)
-    over = (bus_now_ns[at] - before > burst_ns + NANO // 2) | (now_ns[at] - before > burst_ns + LATE_NS)
-    if over.any():
-        raise UnlikeError("time stamps that go back within a burst")
     first = runs.first[later]
     begun = np.where(first >= 0, first_row + frames.row[runs.at[np.maximum(first, 0)]], running.first_row)
     if (first_row + frames.row[at] - begun > _MOST_ROWS).any():
         raise UnlikeError("a burst spread over thousands of records")
+    if (now_ns == frames.start_ns).all():
+        return  # the times rise
+    before = np.where(later > 0, frames.end_ns[runs.at[np.maximum(later - 1, 0)]], running.end_ns)
+    over = (bus_now_ns[at] - before > burst_ns + NANO // 2) | (now_ns[at] - before > burst_ns + LATE_NS)
+    if over.any():
+        raise UnlikeError("time stamps that go back within a burst")

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dalyref import cells, texts
+from dalytools.bulk.bus_frames import rows_of
 from dalytools.bulk.columns import Column, Table
 from dalytools.bulk.runs import Running
 
@@ -160,9 +161,7 @@ def _tell(burst: Running, found: Found) -> None:
     for part in whole:
         slots += cells.cells(b"\0" + part) if burst.data_id == cells.CELLS else part
     slots = slots[: burst.count] if burst.count else slots
-    width = _WIDTH[burst.data_id]
-    row = np.zeros((1, width), np.int64)
-    row[0, : len(slots)] = slots
+    row = np.array([slots], np.int64)
     told = [np.array([one], np.int64) for one in burst.told]
     found.rows[burst.data_id].add(told, np.array([burst.address]), np.array([len(slots)]), row)
 
@@ -182,7 +181,7 @@ def ended(burst: Running, found: Found) -> None:
 def _at_once(frames: BusFrames, runs: Runs, count: Ints, data_id: int, records: Records, found: Found) -> None:
     """Find the tables of bursts that began in this lot and have no repeats, but for the last that may go on."""
     at, number = runs.at, runs.number
-    per_frame, width = cells.SLOTS[data_id], _WIDTH[data_id]
+    per_frame = cells.SLOTS[data_id]
     mine = (frames.byte(2)[at] == data_id) & (runs.first >= 0)
     index = np.flatnonzero(mine)
     if not len(index):
@@ -203,18 +202,18 @@ def _at_once(frames: BusFrames, runs: Runs, count: Ints, data_id: int, records: 
     if not len(which):
         return
     length = np.where(known[which] > 0, known[which], per_frame * (step[which] + 1))
-    raw = frames.words.view(np.uint8).reshape(-1, 16)
-    frames_each = width // per_frame
+    frames_each = int(step[which].max()) + 1
+    width = frames_each * per_frame
     places = np.minimum(first[which][:, None] + np.arange(frames_each), index[which][:, None])
-    payload = raw[at[places], 5:12]
+    raw = rows_of(frames.words, at[places])
     if data_id == cells.CELLS:
-        slots = (payload[:, :, 0:6:2].astype(np.int64) << 8 | payload[:, :, 1:6:2]).reshape(len(which), width)
+        slots = (raw[:, :, 5:11:2].astype(np.int64) << 8 | raw[:, :, 6:11:2]).reshape(len(which), width)
     else:
-        slots = payload.reshape(len(which), width).astype(np.int64)
+        slots = raw[:, :, 5:12].reshape(len(which), width).astype(np.int64)
     slots[np.arange(width) >= length[:, None]] = 0
     row = frames.row[at[index[which]]]
     told = (records.number[row], records.time_ns[row], records.interface[row])
-    address = raw[at[index[which]], 1].astype(np.int64)
+    address = frames.byte(1)[at[index[which]]].astype(np.int64)
     found.rows[data_id].add(told, address, length, slots)
 
 
@@ -233,7 +232,8 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
     number, time_ns, interface, address, length = (
         np.concatenate(column) for column in (rows.number, rows.time_ns, rows.interface, rows.address, rows.length)
     )
-    slots = np.concatenate(rows.slots)
+    width = max(part.shape[1] for part in rows.slots)
+    slots = np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in rows.slots])
     order = np.argsort(number, kind="stable")
     number, time_ns, interface, address, length, slots = (
         column[order] for column in (number, time_ns, interface, address, length, slots)
