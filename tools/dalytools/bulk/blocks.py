@@ -153,10 +153,7 @@ class BlockReader:
         first, size = int(starts[0]), int(words[starts[0] + 1]) >> 2
         last = int(starts[-1])
         alike = int(words[last + 1]) >> 2 == size and (starts[1:] - starts[:-1] == size).all()
-        if alike:
-            block = words[first : last + size].reshape(-1, size)
-        else:
-            block = words[starts[:, None] + np.arange(6)]
+        block = words[first : last + size].reshape(-1, size) if alike else words[starts[:, None] + np.arange(6)]
         sizes = block[:, 1].astype(np.int64) >> 2
         interface = block[:, 2]
         high = block[:, 3]

@@ -58,6 +58,20 @@ class Batch:
     """By row of `records`: what a Modbus frame says."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Lot:
+    """A batch in the making."""
+
+    batch: Batch
+    found: tables.Found
+    now_ns: Ints
+    """The latest beginning of a record of any bus, by record."""
+    count: Ints
+    """By record: of 95 and 96 the number of cells or sensors (0: not known), of 90 the state beside it (-1: none)."""
+    base: Ints
+    """By record: what the numbers of its burst are counted from; -1: it is no part of any."""
+
+
 @dataclass(slots=True)
 class _Bus:
     """What is remembered of one bus from lot to lot."""
@@ -92,7 +106,7 @@ class Decoder:
         self._pace = _Pace()
 
     def take(self, records: Records) -> Batch:
-        """Take the next records; return them with their values. Raises UnlikeError where only the plain decoder will do."""
+        """Take the next records; return them with their values. Raises UnlikeError where this can not decide."""
         found = tables.Found()
         batch = self._decode(records, found)
         _whole(batch, found)
@@ -107,6 +121,11 @@ class Decoder:
         _whole(batch, found)
         return batch
 
+    def open_bursts(self) -> frozenset[tuple[int, int]]:
+        """Return number and time of the last record of each burst whose table or text is not told yet."""
+        running = (bus.running for bus in self._buses.values())
+        return frozenset(burst.told[:2] for burst in running if burst.parts and not burst.count)
+
     def _decode(self, records: Records, found: tables.Found) -> Batch:
         count = len(records)
         batch = Batch(records, np.zeros(count, np.uint8), {}, {}, None, None, [], {})
@@ -115,12 +134,11 @@ class Decoder:
         now_ns = risen(records.time_ns, self._now_ns)
         self._now_ns = int(now_ns[-1])
         self._pace.check(now_ns)
-        count_of = np.zeros(count, np.int64)
-        base_of = np.full(count, -1, np.int64)
+        lot = _Lot(batch, found, now_ns, np.zeros(count, np.int64), np.full(count, -1, np.int64))
         for bus, rows in self._by_bus(records):
-            self._of_bus(bus, rows, batch, now_ns, found, count_of, base_of)
+            self._of_bus(bus, rows, lot)
         self._rows += count
-        self._tables(batch, count_of, base_of)
+        _add_tables(lot)
         return batch
 
     def _by_bus(self, records: Records) -> list[tuple[_Bus, Ints]]:
@@ -143,17 +161,8 @@ class Decoder:
         which = of_interface[records.interface]
         return [(bus, np.flatnonzero(which == numbers[key])) for key, bus in buses.items()]
 
-    def _of_bus(
-        self,
-        bus: _Bus,
-        rows: Ints,
-        batch: Batch,
-        now_ns: Ints,
-        found: tables.Found,
-        count_of: Ints,
-        base_of: Ints,
-    ) -> None:
-        records = batch.records
+    def _of_bus(self, bus: _Bus, rows: Ints, lot: _Lot) -> None:
+        batch, records, now_ns = lot.batch, lot.batch.records, lot.now_ns
         everything = len(rows) == len(records)
         here: slice | Ints = slice(None) if everything else rows
         bus_now_ns = risen(records.time_ns[here], bus.now_ns)
@@ -192,22 +201,14 @@ class Decoder:
         bus.directions.find(both, known, bus.running)
         frames.direction = both.direction[known:]
         judged = runs.judge(frames, bus.running, self._burst_ns)
-        runs.check(frames, judged, bus.running, bus_now_ns, now_ns[here], self._rows, self._burst_ns)
+        clock = runs.Clock(bus_now_ns, now_ns[here], self._burst_ns)
+        runs.check(frames, judged, bus.running, clock, self._rows)
         frames.answers[judged.at[judged.begins]] = True
         batch.direction[here] = frames.direction
-        self._counts(bus, frames, judged, records, found, count_of, base_of)
+        self._find(bus, frames, judged, lot)
         self._remember(bus, frames, before)
 
-    def _counts(
-        self,
-        bus: _Bus,
-        frames: BusFrames,
-        judged: runs.Runs,
-        records: Records,
-        found: tables.Found,
-        count_of: Ints,
-        base_of: Ints,
-    ) -> None:
+    def _find(self, bus: _Bus, frames: BusFrames, judged: runs.Runs, lot: _Lot) -> None:
         """Find how many cells and sensors each burst has, and its tables."""
         reply = frames.direction == REPLY
         data_id, address = frames.byte(2), frames.byte(1)
@@ -225,15 +226,16 @@ class Decoder:
             known = newest.look(at, address[at], status[valid], address[status[valid]], told[valid])
             count[mine] = np.maximum(known, 0)
         row = frames.row[judged.at]
-        count_of[row] = count
-        base_of[row] = judged.base
+        lot.count[row] = count
+        lot.base[row] = judged.base
         if len(judged.at) and judged.first[0] < 0:
             count[judged.first < 0] = bus.running.count
-        bus.running = tables.find(frames, judged, count, bus.running, records, found, self._rows)
+        bursts = tables.Bursts(frames, judged, count, lot.batch.records, lot.found)
+        bus.running = bursts.find(bus.running, self._rows)
         packs = np.flatnonzero(reply & (data_id == _PACK))
         mos = np.flatnonzero(reply & (data_id == _MOS))
         state = bus.state.look(packs, address[packs], mos, address[mos], frames.byte(4)[mos])
-        count_of[frames.row[packs]] = state  # of a 90: the state beside it
+        lot.count[frames.row[packs]] = state
 
     def _remember(self, bus: _Bus, frames: BusFrames, before: BusFrames) -> None:
         """Keep what a request still to come may belong to."""
@@ -248,34 +250,6 @@ class Decoder:
         kept = frames.part(np.arange(begin, len(frames)))
         kept.row = kept.row - (1 << 62)
         bus.before = kept
-
-    @staticmethod
-    def _tables(batch: Batch, count_of: Ints, base_of: Ints) -> None:
-        records, direction = batch.records, batch.direction
-        raw = records.words.view(np.uint8).reshape(-1, 16)
-        replies = np.flatnonzero(direction == REPLY)
-        ids = raw[replies, 2]
-        for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
-            rows = replies[ids == data_id]
-            data = rows_of(records.words, rows)[:, 4:12]
-            if data_id in cells.SLOTS:
-                columns = _parts(data_id, data, count_of[rows], base_of[rows])
-            elif data_id in texts.FIELDS:
-                columns = {"daly.frame_number": Column(data[:, 0])}
-            else:
-                columns = payloads.of_replies(data_id, data)
-                if data_id == _PACK:
-                    state = count_of[rows]
-                    columns["daly.pack.state"] = Column(np.maximum(state, 0).astype(np.uint8), state >= 0)
-            if columns:
-                batch.replies[data_id] = _table(records, rows, columns)
-        requests = np.flatnonzero(direction == REQUEST)
-        ids = raw[requests, 2]
-        for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
-            if writes.is_write(data_id):
-                rows = requests[ids == data_id]
-                columns = payloads.of_writes(data_id, rows_of(records.words, rows)[:, 4:12])
-                batch.writes[data_id] = _table(records, rows, columns)
 
 
 class _Pace:
@@ -300,6 +274,37 @@ class _Pace:
         del self._marks[: -self._STEPS]
 
 
+def _add_tables(lot: _Lot) -> None:
+    """Add a table for each data ID."""
+    batch, count_of, base_of = lot.batch, lot.count, lot.base
+    records, direction = batch.records, batch.direction
+    raw = records.words.view(np.uint8).reshape(-1, 16)
+    replies = np.flatnonzero(direction == REPLY)
+    ids = raw[replies, 2]
+    for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
+        rows = replies[ids == data_id]
+        data = rows_of(records.words, rows)[:, 4:12]
+        if data_id in cells.SLOTS:
+            columns = _parts(data_id, data, count_of[rows], base_of[rows])
+        elif data_id in texts.FIELDS:
+            columns = {"daly.frame_number": Column(data[:, 0])}
+        else:
+            columns = payloads.of_replies(data_id, data)
+            if data_id == _PACK:
+                state = count_of[rows]
+                columns["daly.pack.state"] = Column(np.maximum(state, 0).astype(np.uint8), state >= 0)
+        if columns:
+            batch.replies[data_id] = _table(records, rows, columns)
+    requests = np.flatnonzero(direction == REQUEST)
+    ids = raw[requests, 2]
+    for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
+        if writes.is_write(data_id):
+            rows = requests[ids == data_id]
+            columns = payloads.of_writes(data_id, rows_of(records.words, rows)[:, 4:12])
+            if columns:
+                batch.writes[data_id] = _table(records, rows, columns)
+
+
 def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Column]:
     """Return the columns of single frames of 95 or 96. base: -1 where a frame is no part of any burst."""
     slots = cells.SLOTS[data_id]
@@ -317,15 +322,14 @@ def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Colu
 
 def _table(records: Records, rows: Ints, columns: dict[str, Column]) -> Table:
     address = records.words.view(np.uint8).reshape(-1, 16)[rows, 1]
-    return Table(
-        records.number[rows], records.time_ns[rows], records.interface[rows], address, BOARD[address], columns
-    )
+    return Table(records.number[rows], records.time_ns[rows], records.interface[rows], address, BOARD[address], columns)
 
 
 def _whole(batch: Batch, found: tables.Found) -> None:
     """Add the tables and texts that are complete."""
     batch.cells = tables.table(cells.CELLS, found.rows[cells.CELLS], BOARD)
     batch.sensors = tables.table(cells.TEMPERATURES, found.rows[cells.TEMPERATURES], BOARD)
-    batch.texts = [(*told, texts.FIELDS[data_id], text) for *told, data_id, text in sorted(found.texts)]
-
-
+    batch.texts = [
+        (number, time_ns, interface, address, texts.FIELDS[data_id], text)
+        for number, time_ns, interface, address, data_id, text in sorted(found.texts)
+    ]

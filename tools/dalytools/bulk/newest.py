@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The newest value before a place, for each board by itself: counts of 94 for the bursts, the state of 93 for the 90."""
+"""The newest value before a place, for each board by itself: counts of 94 for bursts, the state of 93 for a 90."""
 
 from __future__ import annotations
 

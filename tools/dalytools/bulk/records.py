@@ -24,7 +24,7 @@ from dalyref.packet import SERIAL_LINK_TYPES
 from dalyref.streams import Located
 from dalytools.bulk.frames import Stands, ambiguous, gather, good, stands
 from dalytools.bulk.packets import SIDES
-from dalytools.bulk.unlike import UnlikeError
+from dalytools.bulk.unlike import NotSerialError, UnlikeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -104,7 +104,7 @@ class Cutter:
         known = self._interfaces.link_type
         serial = np.array([link_type in SERIAL_LINK_TYPES for link_type in known], np.bool_)
         if not serial.all() and not serial[packets.interface].all():
-            raise UnlikeError("packets that are not of a serial line")
+            raise NotSerialError("holds packets that are not of a serial line")
         if len(known) > _MOST_INTERFACES:
             raise UnlikeError("more than a thousand interfaces")
 
@@ -223,10 +223,7 @@ class _Streams:
         self._rows: dict[tuple[int, int], Sequence[int]] = {}
         interface, side = packets.interface, packets.side
         self._one = bool(
-            len(packets)
-            and packets.length.all()
-            and (interface == interface[0]).all()
-            and (side == side[0]).all()
+            len(packets) and packets.length.all() and (interface == interface[0]).all() and (side == side[0]).all()
         )
 
     def present(self) -> list[tuple[int, int]]:

@@ -3,8 +3,8 @@
 
     replies   94 | 95/1  95/2  95/3 | 95/1  95/2 | 96/1 | 96/1      | begins, else it goes on with the reply before it
 
-Whether a reply goes on with a burst depends on the reply before it (frames that are skipped do not count) and, where both
-have the same number, on whether a request for the ID came between them.
+Whether a reply goes on with a burst depends on the reply before it (frames that are skipped do not count) and, where
+both have the same number, on whether a request for the ID came between them.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Runs:
     number: Ints
     """As sent, of frames of a burst; else -1."""
     first: Ints
-    """Index, among these rows, of the first of its burst; -1: it goes on with the one that was running before the lot."""
+    """Index, among these rows, of the first of its burst; -1: it goes on with the one that was running before."""
     base: Ints
     """What the numbers of its burst are counted from: 0 or 1."""
 
@@ -159,13 +159,22 @@ def _asked_between(frames: BusFrames, after: Ints, before: Ints, data_id: Bytes)
     return out
 
 
-def check(
-    frames: BusFrames, runs: Runs, running: Running, bus_now_ns: Ints, now_ns: Ints, first_row: int, burst_ns: int
-) -> None:
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """What time it was at each frame."""
+
+    bus_ns: Ints
+    """The latest beginning of a record of this bus so far."""
+    now_ns: Ints
+    """The same of any bus."""
+    burst_ns: int
+    """A burst ends after so long a quiet."""
+
+
+def check(frames: BusFrames, runs: Runs, running: Running, clock: Clock, first_row: int) -> None:
     """Raise UnlikeError where the plain decoder may have ended a burst by time that these rules go on with.
 
-    bus_now_ns, now_ns: the latest beginning of a record, on this bus and on any, by frame. first_row: number of the lot's
-    first record over the whole file.
+    first_row: number of the lot's first record over the whole file.
     """
     later = np.flatnonzero(~runs.begins)
     if not len(later):
@@ -175,9 +184,10 @@ def check(
     begun = np.where(first >= 0, first_row + frames.row[runs.at[np.maximum(first, 0)]], running.first_row)
     if (first_row + frames.row[at] - begun > _MOST_ROWS).any():
         raise UnlikeError("a burst spread over thousands of records")
-    if (now_ns == frames.start_ns).all():
+    if (clock.now_ns == frames.start_ns).all():
         return  # the times rise
     before = np.where(later > 0, frames.end_ns[runs.at[np.maximum(later - 1, 0)]], running.end_ns)
-    over = (bus_now_ns[at] - before > burst_ns + NANO // 2) | (now_ns[at] - before > burst_ns + LATE_NS)
+    over = clock.bus_ns[at] - before > clock.burst_ns + NANO // 2
+    over |= clock.now_ns[at] - before > clock.burst_ns + LATE_NS
     if over.any():
         raise UnlikeError("time stamps that go back within a burst")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Whole tables of cells and sensors, and texts, of the bursts that carry them (docs/records.md, 8).
 
-    95/1 95/2 95/3 95/4 95/5 95/6      16 cells known: the table stands in 95/6, all at once
-    95/1 95/1 95/2 ..                  repeats, bursts that began in the lot before, texts: one by one
+95/1 95/2 95/3 95/4 95/5 95/6      16 cells known: the table stands in 95/6, all at once
+95/1 95/1 95/2 ..                  repeats, bursts that began in the lot before, texts: one by one
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dalyref import cells, texts
+from dalyref.addresses import REQUEST
 from dalytools.bulk.bus_frames import rows_of
 from dalytools.bulk.columns import Column, Table
 from dalytools.bulk.runs import Running
@@ -20,12 +21,13 @@ from dalytools.bulk.runs import Running
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dalytools.bulk.arrays import Array, Bytes, Ints
+    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints
     from dalytools.bulk.bus_frames import BusFrames
     from dalytools.bulk.records import Records
     from dalytools.bulk.runs import Runs
 
 _WIDTH: Final = {cells.CELLS: cells.MOST_CELLS, cells.TEMPERATURES: cells.MOST_SENSORS}
+_TEXTS: Final = list(texts.FIELDS)
 FIELDS: Final = {
     cells.CELLS: ("daly.cells.", "voltage"),
     cells.TEMPERATURES: ("daly.sensors.", "temperature"),
@@ -60,98 +62,135 @@ class Found:
 
     rows: dict[int, Rows] = field(default_factory=lambda: {data_id: Rows() for data_id in _WIDTH})
     """By data ID."""
-    texts: list[tuple[int, int, int, int, int, str]] = field(
-        default_factory=list[tuple[int, int, int, int, int, str]]
-    )
+    texts: list[tuple[int, int, int, int, int, str]] = field(default_factory=list[tuple[int, int, int, int, int, str]])
     """Number, time, interface, address, data ID, text."""
 
 
-def find(
-    frames: BusFrames, runs: Runs, count: Ints, running: Running, records: Records, found: Found, first_row: int
-) -> Running:
-    """Find what is complete in a lot; return the burst that is still running at its end.
+@dataclass(frozen=True, slots=True)
+class Bursts:
+    """The bursts of one bus in one lot."""
 
-    count: of cells or sensors at the beginning of each reply's burst, 0: not known.
-    """
-    at = runs.at
-    if not len(at):
-        asked = int(((frames.direction == 1) & (frames.byte(2) == running.data_id)).sum())
-        return replace(running, asked=running.asked + asked)
-    data_id = frames.byte(2)[at]
-    begins = np.flatnonzero(runs.begins)
-    first_begin = int(begins[0]) if len(begins) else len(at)
-    # The burst that was running goes on; when another reply begins something, it has ended.
-    current = running
-    if first_begin:
-        current = _one_by_one(frames, runs, range(first_begin), current, records, found)
-    if len(begins):
-        ended(current, found)
-        for kind in _WIDTH:
-            _at_once(frames, runs, count, kind, records, found)
-        odd = _odd(runs, data_id)
-        bounds = np.append(begins, len(at)).tolist()
-        for index in odd.tolist():
-            members = range(bounds[index], bounds[index + 1])
-            begun = _begun(frames, runs, members[0], int(count[members[0]]), first_row)
-            last = _one_by_one(frames, runs, members, begun, records, found)
-            if index + 1 < len(begins):
-                ended(last, found)
-        members = range(bounds[-2], len(at))
-        current = _begun(frames, runs, members[0], int(count[members[0]]), first_row)
-        # What is told of it at once was told above.
-        current = _one_by_one(frames, runs, members, current, records, Found())
-    last_at = int(at[-1])
-    later = frames.part(slice(last_at + 1, None))
-    current.asked = int(((later.direction == 1) & (later.byte(2) == current.data_id)).sum())
-    return current
+    frames: BusFrames
+    runs: Runs
+    count: Ints
+    """Of cells or sensors at the beginning of each reply's burst, 0: not known."""
+    records: Records
+    found: Found
+    """Takes what is complete."""
 
+    def find(self, running: Running, first_row: int) -> Running:
+        """Find the tables and texts, given the burst that was running; return the one that is running at the end.
 
-def _odd(runs: Runs, data_id: Bytes) -> Ints:
-    """Return which bursts, by their order, are to be taken one by one."""
-    begins = np.flatnonzero(runs.begins)
-    ids = data_id[begins]
-    text = np.isin(ids, list(texts.FIELDS))
-    tabled = np.isin(ids, list(_WIDTH))
-    repeats = _repeated(runs)[begins]
-    return np.flatnonzero(text | (tabled & repeats))
+        first_row: number of the lot's first record over the whole file.
+        """
+        frames, runs, found = self.frames, self.runs, self.found
+        at = runs.at
+        if not len(at):
+            return replace(running, asked=running.asked + _asked(frames, running.data_id))
+        data_id = frames.byte(2)[at]
+        begins = np.flatnonzero(runs.begins)
+        current = running
+        # The burst that was running goes on; when another reply begins something, it has ended.
+        first_begin = int(begins[0]) if len(begins) else len(at)
+        if first_begin:
+            current = self._one_by_one(range(first_begin), current, found)
+        if len(begins):
+            ended(current, found)
+            repeated = _repeated(runs)
+            for kind in _WIDTH:
+                self._at_once(kind, repeated)
+            bounds = np.append(begins, len(at)).tolist()
+            odd = np.isin(data_id[begins], _TEXTS) | (np.isin(data_id[begins], list(_WIDTH)) & repeated[begins])
+            for index in np.flatnonzero(odd).tolist():
+                members = range(bounds[index], bounds[index + 1])
+                last = self._one_by_one(members, self._begun(members[0], first_row), found)
+                if index + 1 < len(begins):
+                    ended(last, found)
+            members = range(bounds[-2], len(at))
+            # What can be told of it already was told above.
+            current = self._one_by_one(members, self._begun(members[0], first_row), Found())
+        current.asked = _asked(frames.part(slice(int(at[-1]) + 1, None)), current.data_id)
+        return current
 
+    def _begun(self, index: int, first_row: int) -> Running:
+        place = int(self.runs.at[index])
+        data = self.frames.bytes_of(place)
+        base = int(self.runs.base[index])
+        return Running(
+            data_id=data[2],
+            address=data[1],
+            base=base,
+            count=int(self.count[index]),
+            whole=True,
+            number=base - 1,
+            first_row=first_row + int(self.frames.row[place]),
+        )
 
-def _begun(frames: BusFrames, runs: Runs, index: int, count: int, first_row: int) -> Running:
-    place = int(runs.at[index])
-    data = frames.bytes_of(place)
-    return Running(
-        data_id=data[2],
-        address=data[1],
-        base=int(runs.base[index]),
-        count=count,
-        whole=True,
-        number=int(runs.base[index]) - 1,
-        first_row=first_row + int(frames.row[place]),
-    )
-
-
-def _one_by_one(
-    frames: BusFrames, runs: Runs, members: range, burst: Running, records: Records, found: Found
-) -> Running:
-    """Take the frames of one burst; tell of its table where a count is known."""
-    per_frame = cells.SLOTS.get(burst.data_id, 0)
-    for index in members:
-        place = int(runs.at[index])
-        row = int(frames.row[place])
-        data = frames.bytes_of(place)
-        burst.end_ns = int(frames.end_ns[place])
-        burst.told = (int(records.number[row]), int(records.time_ns[row]), int(records.interface[row]))
-        number = int(runs.number[index])
-        if number < 0:
+    def _one_by_one(self, members: range, burst: Running, found: Found) -> Running:
+        """Take the frames of one burst; tell of its table where a count is known."""
+        frames, records = self.frames, self.records
+        per_frame = cells.SLOTS.get(burst.data_id, 0)
+        for index in members:
+            place = int(self.runs.at[index])
+            row = int(frames.row[place])
+            data = frames.bytes_of(place)
+            burst.end_ns = int(frames.end_ns[place])
+            burst.told = (int(records.number[row]), int(records.time_ns[row]), int(records.interface[row]))
+            number = int(self.runs.number[index])
+            if number < 0:
+                burst.number = number
+                continue
+            burst.whole = burst.whole and number <= burst.number + 1
             burst.number = number
-            continue
-        burst.whole = burst.whole and number <= burst.number + 1
-        burst.number = number
-        burst.parts[number] = data[5:12]
-        first = per_frame * (number - burst.base) + 1
-        if burst.count and burst.whole and first <= burst.count < first + per_frame:
-            _tell(burst, found)
-    return burst
+            burst.parts[number] = data[5:12]
+            first = per_frame * (number - burst.base) + 1
+            if burst.count and burst.whole and first <= burst.count < first + per_frame:
+                _tell(burst, found)
+        return burst
+
+    def _at_once(self, data_id: int, repeated: Flags) -> None:
+        """Find the tables of bursts that began in this lot and have no repeats, but for the last that may go on."""
+        frames, runs, count, records = self.frames, self.runs, self.count, self.records
+        at, number = runs.at, runs.number
+        per_frame = cells.SLOTS[data_id]
+        mine = (frames.byte(2)[at] == data_id) & (runs.first >= 0)
+        index = np.flatnonzero(mine)
+        if not len(index):
+            return
+        first = runs.first[index]
+        step = number[index] - runs.base[index]
+        # Frame number n is the n-th of its burst, so none before it is missing or came twice.
+        in_order = index - first == step
+        begin = per_frame * step + 1
+        known = count[first]
+        complete = (known > 0) & (begin <= known) & (known < begin + per_frame)
+        # Without a count the last of the burst carries the table; whether the lot's last has ended is not known yet.
+        last = np.ones(len(at), np.bool_)
+        last[:-1] = runs.begins[1:]
+        last[-1] = False
+        complete |= (known == 0) & last[index]
+        which = np.flatnonzero(in_order & complete & ~repeated[first])
+        if not len(which):
+            return
+        length = np.where(known[which] > 0, known[which], per_frame * (step[which] + 1))
+        frames_each = int(step[which].max()) + 1
+        width = frames_each * per_frame
+        places = np.minimum(first[which][:, None] + np.arange(frames_each), index[which][:, None])
+        raw = rows_of(frames.words, at[places])
+        if data_id == cells.CELLS:
+            slots = (raw[:, :, 5:11:2].astype(np.int64) << 8 | raw[:, :, 6:11:2]).reshape(len(which), width)
+        else:
+            slots = raw[:, :, 5:12].reshape(len(which), width).astype(np.int64)
+        slots[np.arange(width) >= length[:, None]] = 0
+        row = frames.row[at[index[which]]]
+        told = (records.number[row], records.time_ns[row], records.interface[row])
+        address = frames.byte(1)[at[index[which]]].astype(np.int64)
+        self.found.rows[data_id].add(told, address, length, slots)
+
+
+def _asked(frames: BusFrames, data_id: int) -> int:
+    """Return how many requests for an ID there are."""
+    return int(((frames.direction == REQUEST) & (frames.byte(2) == data_id)).sum())
 
 
 def _tell(burst: Running, found: Found) -> None:
@@ -178,46 +217,7 @@ def ended(burst: Running, found: Found) -> None:
             found.texts.append((*burst.told, burst.address, burst.data_id, text))
 
 
-def _at_once(frames: BusFrames, runs: Runs, count: Ints, data_id: int, records: Records, found: Found) -> None:
-    """Find the tables of bursts that began in this lot and have no repeats, but for the last that may go on."""
-    at, number = runs.at, runs.number
-    per_frame = cells.SLOTS[data_id]
-    mine = (frames.byte(2)[at] == data_id) & (runs.first >= 0)
-    index = np.flatnonzero(mine)
-    if not len(index):
-        return
-    first = runs.first[index]
-    step = number[index] - runs.base[index]
-    # Frame number n is the n-th of its burst, so none before it is missing or came twice.
-    in_order = index - first == step
-    begin = per_frame * step + 1
-    known = count[first]
-    complete = (known > 0) & (begin <= known) & (known < begin + per_frame)
-    # Without a count the last of the burst carries the table; whether the lot's last burst has ended is not known yet.
-    last = np.ones(len(at), np.bool_)
-    last[:-1] = runs.begins[1:]
-    last[-1] = False
-    complete |= (known == 0) & last[index]
-    which = np.flatnonzero(in_order & complete & ~_repeated(runs)[first])
-    if not len(which):
-        return
-    length = np.where(known[which] > 0, known[which], per_frame * (step[which] + 1))
-    frames_each = int(step[which].max()) + 1
-    width = frames_each * per_frame
-    places = np.minimum(first[which][:, None] + np.arange(frames_each), index[which][:, None])
-    raw = rows_of(frames.words, at[places])
-    if data_id == cells.CELLS:
-        slots = (raw[:, :, 5:11:2].astype(np.int64) << 8 | raw[:, :, 6:11:2]).reshape(len(which), width)
-    else:
-        slots = raw[:, :, 5:12].reshape(len(which), width).astype(np.int64)
-    slots[np.arange(width) >= length[:, None]] = 0
-    row = frames.row[at[index[which]]]
-    told = (records.number[row], records.time_ns[row], records.interface[row])
-    address = frames.byte(1)[at[index[which]]].astype(np.int64)
-    found.rows[data_id].add(told, address, length, slots)
-
-
-def _repeated(runs: Runs) -> Array:
+def _repeated(runs: Runs) -> Flags:
     """Tell which bursts, by the index of their first frame, are taken one by one for a repeat in them."""
     out = np.zeros(len(runs.at), np.bool_)
     within = np.flatnonzero(~runs.begins[1:] & (runs.number[1:] == runs.number[:-1])) + 1
@@ -239,17 +239,17 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
         column[order] for column in (number, time_ns, interface, address, length, slots)
     )
     prefix, name = FIELDS[data_id]
-    there = np.arange(slots.shape[1]) < length[:, None]
+    there: Flags = np.arange(width, dtype=np.int64)[None, :] < np.asarray(length, np.int64)[:, None]
     shown = slots
     if data_id == cells.TEMPERATURES:
         shown = slots - 40
-        there &= (slots != 0x00) & (slots != 0xFF)  # no sensor (dalyref.cells.is_there)
-    some = there.any(1)
+        there = there & (slots != 0x00) & (slots != 0xFF)  # no sensor (dalyref.cells.is_there)
+    some: Flags = np.any(there, axis=1)
     low_first = np.where(there, slots, 1 << 20).argmin(1)
     high_first = np.where(there, slots, -1).argmax(1)
     each = np.arange(len(slots))
     low, high = slots[each, low_first], slots[each, high_first]
-    how_many = np.maximum(there.sum(1), 1)
+    how_many = np.maximum(np.count_nonzero(there, axis=1), 1)
     average = np.where(there, slots, 0).sum(1) / how_many
     zero = 40 if data_id == cells.TEMPERATURES else 0
     valid = None if some.all() else some

@@ -5,4 +5,8 @@ from __future__ import annotations
 
 
 class UnlikeError(Exception):
-    """A capture has what only the plain decoder reads; said in a few words."""
+    """A capture has what only the plain decoder decides; said in a few words."""
+
+
+class NotSerialError(UnlikeError):
+    """A capture has packets of another medium than a serial line."""

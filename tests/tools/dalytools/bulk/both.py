@@ -5,14 +5,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import dalyref.decoder
 from dalycapture.errors import CaptureError
 from dalycapture.reader import read_capture
-import dalyref.decoder
 from dalyref.options import Options
 from dalytools.bulk.blocks import CHUNK
 from dalytools.bulk.bus_frames import BOARD
-from dalytools.bulk.lots import Decoder
+from dalytools.bulk.left_out import LEFT_OUT
 from dalytools.bulk.packets import SIDES, Interfaces
+from dalytools.bulk.read import read
 from dalytools.bulk.reading import read_columns
 from dalytools.bulk.records import DIALECTS, KINDS, Cutter
 
@@ -89,52 +90,6 @@ def _pieces(records: Records) -> Iterator[Piece]:
         )
 
 
-LEFT_OUT = (
-    # What is said of exchanges, of bursts, and of what changed or contradicts.
-    "daly.request_in",
-    "daly.reply_in",
-    "daly.response_time",
-    "daly.retry",
-    "daly.unanswered",
-    "daly.unasked",
-    "daly.late_to",
-    "daly.other_board",
-    "daly.second_host",
-    "daly.write_result",
-    "daly.reassembled_in",
-    "daly.burst.missing",
-    "daly.burst.repeat",
-    "daly.burst.cut_off",
-    "daly.changed",
-    "daly.changed_from",
-    "daly.fault_raised",
-    "daly.fault_cleared",
-    "daly.contradiction",
-    "daly.contradicts",
-    # What stands in the frame's bytes, or in another column.
-    "daly.kind",
-    "daly.transport",
-    "daly.dialect",
-    "daly.start",
-    "daly.address",
-    "daly.data_id",
-    "daly.unknown_id",
-    "daly.length",
-    "daly.data",
-    "daly.checksum",
-    "daly.checksum.status",
-    "daly.write",
-    "daly.reserved",
-    "daly.undecoded",
-    "daly.foreign",
-    "daly.text_part",
-    "daly.balance.cell",
-    "daly.modbus.crc",
-    "daly.modbus.crc.status",
-    *(f"daly.cell.{number:02d}" for number in range(1, 49)),
-)
-
-
 def plain_fields(decoded: Iterable[Decoded]) -> list[tuple[int, Fields]]:
     """What each record says, as far as the quick way says it too: (number, fields)."""
     return [
@@ -144,9 +99,6 @@ def plain_fields(decoded: Iterable[Decoded]) -> list[tuple[int, Fields]]:
 
 def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = None) -> list[tuple[int, Fields]]:
     """The same from the columns, put together again."""
-    interfaces = Interfaces()
-    used = options or Options()
-    cutter, decoder = Cutter(used, interfaces), Decoder(used, interfaces)
     out: list[tuple[int, Fields]] = []
     where: dict[tuple[int, int], Fields] = {}  # by number and time: fields of A5 frames
 
@@ -160,7 +112,6 @@ def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = No
                 fields.update(batch.modbus[row])
                 for name in LEFT_OUT:
                     fields.pop(name, None)
-                fields["daly.modbus.address"], fields["daly.modbus.function"] = records.others[row][:2]
             if direction := int(batch.direction[row]):
                 address = records.words[row].tobytes()[1]
                 fields["daly.direction"] = direction
@@ -180,9 +131,8 @@ def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = No
             where[number, time_ns][name] = text
 
     try:
-        for packets in read_columns(path, interfaces, chunk=chunk):
-            take(decoder.take(cutter.take(packets)))
+        for batch in read(path, options, chunk=chunk):
+            take(batch)
     except CaptureError:
         pass
-    take(decoder.finish(cutter.finish()))
     return out

@@ -4,14 +4,24 @@
 from __future__ import annotations
 
 import itertools
+import tracemalloc
 from typing import TYPE_CHECKING
 
 import pytest
 from bench.soak import likely_bus, trouble, write
 from tests.tools.dalytools.bulk.both import plain_fields, plainly, quick_fields
-from tests.tools.dalytools.made import SAMPLES
+from tests.tools.dalytools.made import ANSWER, ASK, SAMPLES, a5
+from tests.tools.dalytools.made import write as write_packets
 
+from bench import poll_cycle
+from dalycapture.errors import CaptureError
 from dalyref.options import Options
+from dalytools.bulk.lots import Batch, Decoder
+from dalytools.bulk.packets import Interfaces
+from dalytools.bulk.read import read
+from dalytools.bulk.reading import read_columns
+from dalytools.bulk.records import Cutter
+from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -19,7 +29,17 @@ if TYPE_CHECKING:
 
     from tests.traffic import Made
 
+    from dalytools.bulk.records import Records
+
 CAPTURES = sorted(path for path in SAMPLES.iterdir() if path.suffix in {".pcapng", ".pcap"})
+
+
+def quick_only(path: Path) -> Iterator[Batch]:
+    """The quick way without the plain one behind it."""
+    interfaces = Interfaces()
+    cutter, decoder = Cutter(Options(), interfaces), Decoder(Options(), interfaces)
+    for packets in read_columns(path, interfaces):
+        yield decoder.take(cutter.take(packets))
 
 
 def agree(path: Path, *chunks: int, options: Options | None = None) -> int:
@@ -43,3 +63,94 @@ def test_trouble(make: Callable[[int], Iterator[Made]], seed: int, tmp_path: Pat
     path = tmp_path / "x.pcapng"
     write(path, itertools.islice(make(seed), 2000))
     assert agree(path, 1 << 20, 3000) > 1800
+
+
+@pytest.mark.parametrize("make", [trouble, likely_bus])
+def test_the_plain_decoder_takes_over_anywhere(
+    make: Callable[[int], Iterator[Made]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.pcapng"
+    write(path, itertools.islice(make(9), 500))
+    expected = plain_fields(plainly(path)[0])
+    left = 0
+    quick = Decoder.take
+
+    def take(decoder: Decoder, records: Records) -> Batch:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise UnlikeError("made")
+        return quick(decoder, records)
+
+    monkeypatch.setattr(Decoder, "take", take)
+    for lots in range(0, 60, 3):
+        left = lots
+        assert quick_fields(path, chunk=600) == expected
+
+
+# What only the plain decoder decides: it takes over, and says what it says.
+
+
+def part(number: int, millivolts: int = 3300, address: int = 1) -> bytes:
+    return a5(address, 0x95, bytes((number,)) + millivolts.to_bytes(2, "big") * 3)
+
+
+def test_a_clock_that_goes_back_within_a_burst(tmp_path: Path) -> None:
+    rows = [(0.0, part(1)), (0.02, part(2)), (20.0, b""), (0.1, part(3)), (0.2, part(4)), (1.0, ASK), (21.0, ANSWER)]
+    path = write_packets(tmp_path / "x.pcapng", rows)
+    with pytest.raises(UnlikeError):
+        list(quick_only(path))
+    assert agree(path, 1 << 20, 100) == 7
+
+
+def test_thousands_of_records_in_a_moment(tmp_path: Path) -> None:
+    path = write_packets(tmp_path / "x.pcapng", [(1e-6 * at, part(1 + at % 3)) for at in range(60_000)])
+    with pytest.raises(UnlikeError):
+        list(quick_only(path))
+
+
+def test_a_burst_over_thousands_of_records(tmp_path: Path) -> None:
+    """One number again and again is one burst; the plain decoder ends it when it holds 65536 records."""
+    path = write_packets(tmp_path / "x.pcapng", [(0.3 * at, part(1)) for at in range(9000)])
+    with pytest.raises(UnlikeError):
+        list(quick_only(path))
+    assert sum(len(batch.records) for batch in read(path)) == 9000
+
+
+def test_other_media_are_said(tmp_path: Path) -> None:
+    path = write_packets(tmp_path / "x.pcapng", [(0.0, ASK)], link_type=227)
+    with pytest.raises(CaptureError, match=r"x\.pcapng: holds packets that are not of a serial line; read it with"):
+        list(read(path))
+
+
+def test_counts_for_a_burst_are_those_at_its_beginning_whatever_the_chunk(tmp_path: Path) -> None:
+    status = a5(1, 0x94, bytes((4, 1, 0, 0, 0, 0, 9, 0)))
+    rows = [(0.0, part(1)), (0.02, part(2)), (0.1, status), (0.2, part(1)), (0.22, part(2)), (0.3, part(1, 3210))]
+    rows += [(0.32, part(2, 3210)), (0.34, part(2, 3200)), (0.36, part(3))]
+    path = write_packets(tmp_path / "x.pcapng", rows)
+    tables = [batch.cells for chunk in (1, 50, 1 << 20) for batch in read(path, chunk=chunk) if batch.cells]
+    found = [table.columns["daly.cells.voltage"].value(row) for table in tables for row in range(len(table))]
+    # Without a count all six slots; with it four; a repeat of the last frame shows the table again.
+    once = [[3300] * 6, [3300] * 4, [3210] * 4, [3210, 3210, 3210, 3200]]
+    assert found == once * 3
+    assert agree(path, 1, 50, 1 << 20) == 9
+
+
+def test_memory_is_bounded(tmp_path: Path) -> None:
+    """Eight times the capture takes no more memory (numpy tells tracemalloc of its arrays)."""
+
+    def peak(frames: int) -> int:
+        path = tmp_path / f"{frames}.pcapng"
+        poll_cycle.write(path, frames)
+        for _ in read(path, chunk=1 << 17):
+            pass
+        tracemalloc.start()
+        try:
+            assert sum(len(batch.records) for batch in read(path, chunk=1 << 17)) == frames
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    small, large = peak(8_000), peak(64_000)
+    assert large < 1.5 * small
+    assert large < 8 << 20
