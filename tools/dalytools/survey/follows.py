@@ -7,7 +7,10 @@ payload to the next. A claim needs all of these (n: payloads at which one of the
 - both changed at least 12 times, and 10 times together;
 - the changes correlate with 0.6 or more, the levels with 0.8 or more;
 - the ranks of the changes correlate so that, of all pairs that were looked at, one in a thousand surveys of bytes that
-  have nothing to do with anything would show one such (Fisher's z, Bonferroni).
+  have nothing to do with anything would show one such (Fisher's z, Bonferroni);
+- where both go on smoothly, as the sun goes over a roof, their changes drift too: n counts for less by as much as the
+  changes resemble those before (Bartlett), and the fourth differences, in which nothing is left of a smooth curve,
+  correlate with 0.4 or more.
 """
 
 from __future__ import annotations
@@ -33,6 +36,8 @@ LAGS: Final = range(-1, 9)
 _CHANGES, _TOGETHER = 12, 10
 _CHANGE_R, _LEVEL_R = 0.6, 0.8
 _CHANCE: Final = 0.001
+_SHARP_R: Final = 0.4
+_DISTANCES: Final = 12
 _LAG_WINS: Final = 0.1
 """A delay is named where it fits the changes by so much better than none."""
 
@@ -150,10 +155,35 @@ def _look(mine: _Series, told: _Series, limit: float) -> tuple[int, float, float
     ranked = _pearson(*(_ranks(column) for column in _columns(change_pairs)))
     if ranked * level < 0:
         return None
-    z = atanh(min(abs(ranked), 0.999999)) * sqrt((len(change_pairs) - 3) / 1.06)
+    if _sharp(mine.changes, told.changes, lag) * (1 if level > 0 else -1) < _SHARP_R:
+        return None
+    count = len(change_pairs) * _independent(mine.changes, told.changes)
+    z = atanh(min(abs(ranked), 0.999999)) * sqrt(max(0.0, count - 3) / 1.06)
     if z < limit:
         return None
     return lag, level, by_lag[lag], len(change_pairs)
+
+
+def _sharp(mine: list[list[float]], told: list[list[float]], lag: int) -> float:
+    """Return the correlation of the fourth differences: nothing is left of a smooth curve in them, all of its steps."""
+    one, other = mine, told
+    for _ in range(3):
+        one, other = ([[b - a for a, b in pairwise(run)] for run in runs] for runs in (one, other))
+    norm = sqrt(_square(one) * _square(other))
+    return _product(one, other, lag) / norm if norm else 0.0
+
+
+def _independent(mine: list[list[float]], told: list[list[float]]) -> float:
+    """Return which share of the changes counts as independent, 0 to 1 (Bartlett: by both series' likeness to themselves).
+
+    What is summed up over many distances is what remains of a slow curve under the steps of its numbers.
+    """
+    longest = max(len(run) for run in mine)
+    alike = 0.0
+    norm = _square(mine) * _square(told)
+    for distance in range(1, min(_DISTANCES, longest // 3) + 1):
+        alike += _product(mine, mine, distance) * _product(told, told, distance) / norm
+    return 1 / (1 + 2 * max(0.0, alike))
 
 
 def _square(runs: list[list[float]]) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 from datetime import UTC, datetime, timedelta
+from functools import partial
+from math import sin, tau
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -151,6 +153,30 @@ def test_what_drifts_as_the_soc_does_is_not_said_to_follow_it(tmp_path: Path) ->
     """Two that wander by themselves look alike in their levels (here r is beyond 0.9), and prove nothing."""
     place = planted(tmp_path, lambda bus, poll: bytes((200 - poll // 3 + bus.random.randrange(2), *bytes(7))))
     assert not said(place, "follows")
+
+
+def test_smooth_curves_that_have_nothing_to_do_with_each_other(tmp_path: Path) -> None:
+    """As the sun goes over a roof: of 128 such numbers, some look alike in levels and changes, none in truth."""
+    for seed in range(4):
+        bus = Bus(400, seed)
+
+        def smooth(bus: Bus = bus) -> Callable[[int], float]:
+            waves = [
+                (bus.random.uniform(0.3, 1), bus.random.uniform(0.2, 3), bus.random.random() * 6) for _ in range(3)
+            ]
+            return lambda poll: sum(size * sin(tau * often * poll / 400 + phase) for size, often, phase in waves)
+
+        current, voltage = smooth(), smooth()
+        bus.current = [30000 + int(4000 * current(poll)) for poll in range(400)]
+        bus.voltage = [530 + int(60 * voltage(poll)) for poll in range(400)]
+        curves = {data_id: [smooth() for _ in range(4)] for data_id in range(0xE0, 0xE8)}
+
+        def reply(some: list[Callable[[int], float]], poll: int) -> bytes:
+            return b"".join((30000 + int(8000 * curve(poll))).to_bytes(2) for curve in some)
+
+        replies = {data_id: partial(reply, some) for data_id, some in curves.items()}
+        places = surveyed(bus.write(tmp_path / f"smooth-{seed}.pcapng", replies), tmp_path, "--id", "E0-E7")
+        assert not any(said(place, "follows") for place in places.values())
 
 
 def test_few_samples_are_too_few(tmp_path: Path) -> None:
