@@ -15,6 +15,7 @@
     98   fault bits                                code
     99   on    current     place .     .     .     .         balance; 9A SOH, D8 wake-up source
     50 .. 6A   settings and texts: settings.py;  70 .. 8A   alarm grid, where the firmware has one
+    9C, 9D     made up for practice: undocumented.py
     10 .. 2A   writes = read - 40, answered with the same bytes (field notes a.3);  00   restart, not answered
     D9   discharge MOS on, off;  DA charge MOS on, off: 01 on, 00 off, answered with the new state (fact 7)
 
@@ -29,9 +30,10 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
-from dalytools.simulator import modbus
+from dalytools.simulator import modbus, undocumented
 from dalytools.simulator.registers import ABSENT, CLOCKS, MOS_SWITCHES, SETTINGS, SOC_WRITES, Measured, d2, p81
 from dalytools.simulator.settings import TEXT_FRAMES, WRITE_OFFSET, Settings
+from dalytools.simulator.undocumented import Undocumented
 
 if TYPE_CHECKING:
     from dalytools.simulator.battery import Battery, Reading
@@ -131,6 +133,7 @@ class SimulatedBoard:
         self._soc = b"\0\0"  # of the last 0x90 as sent
         self._tail_91 = bytes(4)
         self._capacity_low = 0
+        self._undocumented = Undocumented()
         self._behind_switch = bytes(7)  # d1..d7 of the last 0x94 or 0x95
 
     def wake(self) -> None:
@@ -205,10 +208,17 @@ class SimulatedBoard:
                 return [bytes((active > 0,)) + (30000).to_bytes(2) + bytes((active,)) + bytes(4)]
             case 0x9A:
                 return [b"\0\x64" + bytes(6)]
+            case undocumented.VALUES | undocumented.LETTERS if self.board.habits.undocumented:
+                return [self._practice(data_id, reading)]
             case 0xD9 | 0xDA:
                 return [self._switch(data_id, request[4])]
             case _:
                 return self._setting(data_id, request[4:12])
+
+    def _practice(self, data_id: int, reading: Reading) -> bytes:
+        balancer = self.settings.values["balancer"] != 0
+        current = int.from_bytes(self._pack(reading)[4:6])
+        return self._undocumented.payload(data_id, current, balancer=balancer, now_s=self.now_s)
 
     def settable(self, data_id: int) -> bool:
         """Whether a write with this ID changes something here."""

@@ -110,6 +110,7 @@ class Habits:
     writes: Writes = "accept"  # ignore: answered with the old state; pretend: as if taken; silent: not answered
     unanswered: tuple[int, ...] = ()  # data IDs that this firmware does not know
     alarm_grid: bool = False  # whether it answers 70 to 8A (field notes a.2: one source; another board is silent)
+    undocumented: bool = False  # whether it answers the made-up IDs of undocumented.py
 
     def __post_init__(self) -> None:
         _require(self.frame_base in {0, 1}, f"frame numbers from {self.frame_base}: must be 0 or 1")

@@ -167,6 +167,7 @@ def _board(table: Table) -> Board:
         writes=table.word("writes", "accept", ("accept", "ignore", "pretend", "silent")),  # pyright: ignore[reportArgumentType]
         unanswered=table.integers("unanswered", (), 0, 255, shown=_DATA_IDS),
         alarm_grid=table.flag("alarm_grid", default=False),
+        undocumented=table.flag("undocumented", default=False),
     )
     texts = table.table("texts")
     longest = {"manufacturer": 16, "battery_name": 32, "battery_code": 32, "serial_number": 24}

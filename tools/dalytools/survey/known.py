@@ -53,8 +53,8 @@ class Known:
     def take(self, bus: str, board: int, fields: Fields) -> None:
         """Take what a reply of a board tells."""
         values = self._boards.get((bus, board))
-        for name, places in FIELDS.items():
-            value = fields.get(name)
+        for name in FIELDS.keys() & fields.keys():
+            places, value = FIELDS[name], fields[name]
             if not isinstance(value, int | float):
                 continue
             if values is None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Bytes that hold what another frame holds: copies, and what a board left in its buffer.
 
-A byte is looked at when it changes: its new value either stands in the newest payload of another place, at the same
-byte each time, or it does not. What fits at the first few changes is a candidate; most go at the next change.
+When a byte changes, its new value either stands in the newest payload of another place, at the same byte each time, or
+it does not. What fits at the first few changes is a candidate; most go at the next change. One that changed while the
+byte did not is not copied either: that would be a byte that follows it later.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class Candidate:
     index: int
     hits: int = 0
     misses: int = 0
+    """How often the two were different."""
     values: set[int] = field(default_factory=set[int])
     """Some of those with which it was equal."""
 
@@ -43,22 +45,24 @@ class Mirrors:
         self._changes = [0] * size
 
     def take(self, mine: Stream, before: bytes, after: bytes, others: Iterable[Stream]) -> None:
-        """Take a payload that is not equal to the one before it. others: all places of the bus."""
+        """Take a payload, with the one before it. others: all places of the bus."""
         for index, value in enumerate(after):
-            if before[index] == value:
-                continue
-            candidates = self._bytes[index]
+            candidates, changed = self._bytes[index], before[index] != value
             if candidates:
-                self._hold(candidates, value)
+                self._hold(candidates, value, changed=changed)
+            if not changed:
+                continue
             changes = self._changes[index] = self._changes[index] + 1
             if changes <= _LOOKED_FOR:
                 self._look(candidates, mine, value, others, changes - 1)
 
     @staticmethod
-    def _hold(candidates: dict[tuple[int, int], Candidate], value: int) -> None:
+    def _hold(candidates: dict[tuple[int, int], Candidate], value: int, *, changed: bool) -> None:
         gone: list[tuple[int, int]] = []
         for key, candidate in candidates.items():
             if candidate.source.last[candidate.index] == value:
+                if not changed:
+                    continue
                 candidate.hits += 1
                 if len(candidate.values) < _MOST_VALUES:
                     candidate.values.add(value)

@@ -48,8 +48,7 @@ class Stream:
         """Take the next payload. known: of the battery, at this moment. others: all places of the bus."""
         if self.moves.count:
             self.gaps.add(max(0, time_ns - self.last_ns) / NANO)
-            if data != self.last:
-                self.mirrors.take(self, self.last, data, others)
+            self.mirrors.take(self, self.last, data, others)
         else:
             self.first_ns = time_ns
         self.last_ns = time_ns

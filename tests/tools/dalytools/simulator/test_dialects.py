@@ -182,6 +182,18 @@ def test_alarm_grid_is_a_habit() -> None:
     assert struct.unpack(">4H", a5(simulated, 0x72)[0]) == (31500, 500, 29000, 500)
 
 
+def test_made_up_ids_are_a_habit() -> None:
+    """9C: counter, current two replies ago, 5A with the balancer in bit 0, seconds; the balancer is written with 27."""
+    assert board().answer(frame(0x40, 0x9C, bytes(8))) is None
+    simulated = board(undocumented=True)
+    simulated.now_s = 70000.9
+    first = a5(simulated, 0x9C)[0]
+    assert (first[0], first[3], int.from_bytes(first[4:])) == (0, 0x5B, 70000)
+    a5(simulated, 0x27, bytes(1))
+    assert a5(simulated, 0x9C)[0][3] == 0x5A
+    assert a5(simulated, 0x9D) == [b"77B-1A.4"]
+
+
 def test_requests_are_found_in_what_a_client_writes() -> None:
     request = modbus.write_request(0xD2, 0xD4, [1, 2, 3])
     assert [modbus.may_become_request(request[:size]) for size in range(1, 15)] == [True] * 14

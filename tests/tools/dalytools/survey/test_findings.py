@@ -64,6 +64,39 @@ def test_a_byte_that_follows_the_current_two_polls_later(tmp_path: Path) -> None
     assert 100 < claim["n"] <= 300
 
 
+def test_what_comes_later_is_no_copy(tmp_path: Path) -> None:
+    """When it changes, it changes to what 0x90 held two polls before, and mostly still holds: as a copy would."""
+
+    def payload(bus: Bus, poll: int) -> bytes:
+        return bytes((7, *bus.current[max(0, poll - 2)].to_bytes(2), 7, 7, 7, 7, 7))
+
+    bus = Bus()
+    bus.current = [level for level in bus.current[::6] for _ in range(6)]  # steps alone
+    capture = bus.write(tmp_path / "later.pcapng", {0xE0: lambda poll: payload(bus, poll)})
+    place = surveyed(capture, tmp_path)["board 1 reply 0xE0"]
+    assert not said(place, "mirror")
+    ((_, _, text),) = said(place, "follows")
+    assert text.startswith("moves with current, 2 polls later (2 s): r +1.00")
+
+
+def test_two_that_repeat_themselves_at_the_same_turn(tmp_path: Path) -> None:
+    bus = Bus(300)
+    bus.current = [30000 + (400 if poll % 20 < 7 else -200) for poll in range(300)]
+    capture = bus.write(tmp_path / "turns.pcapng", {0xE0: lambda poll: bytes((90 if poll % 20 < 8 else 10, *bytes(7)))})
+    assert not said(surveyed(capture, tmp_path)["board 1 reply 0xE0"], "follows")
+
+
+def test_one_great_jump_proves_nothing(tmp_path: Path) -> None:
+    """Both jump when the load is switched on, and then go their own ways."""
+    bus = Bus(300)
+    r = bus.random
+    bus.current = [30000 + (2000 if poll > 120 else 0) + r.randrange(-20, 21) for poll in range(300)]
+    capture = bus.write(
+        tmp_path / "jump.pcapng", {0xE0: lambda poll: bytes(((200 if poll > 120 else 20) + r.randrange(4), *bytes(7)))}
+    )
+    assert not said(surveyed(capture, tmp_path)["board 1 reply 0xE0"], "follows")
+
+
 def test_a_byte_against_the_size_of_the_current(tmp_path: Path) -> None:
     place = planted(tmp_path, lambda bus, poll: bytes((200 - abs(bus.current[poll] - 30000) // 5, *bytes(7))))
     ((_, _, text),) = said(place, "follows")
@@ -155,6 +188,10 @@ def test_what_drifts_as_the_soc_does_is_not_said_to_follow_it(tmp_path: Path) ->
     assert not said(place, "follows")
 
 
+def curve(waves: list[tuple[float, float, float]], poll: int) -> float:
+    return sum(size * sin(tau * often * poll / 400 + phase) for size, often, phase in waves)
+
+
 def test_smooth_curves_that_have_nothing_to_do_with_each_other(tmp_path: Path) -> None:
     """As the sun goes over a roof: of 128 such numbers, some look alike in levels and changes, none in truth."""
     for seed in range(4):
@@ -164,7 +201,7 @@ def test_smooth_curves_that_have_nothing_to_do_with_each_other(tmp_path: Path) -
             waves = [
                 (bus.random.uniform(0.3, 1), bus.random.uniform(0.2, 3), bus.random.random() * 6) for _ in range(3)
             ]
-            return lambda poll: sum(size * sin(tau * often * poll / 400 + phase) for size, often, phase in waves)
+            return partial(curve, waves)
 
         current, voltage = smooth(), smooth()
         bus.current = [30000 + int(4000 * current(poll)) for poll in range(400)]
