@@ -26,23 +26,28 @@ class Records:
     def __init__(self, chosen: Sequence[Column] = DEFAULT, *, only_with: bool = False) -> None:
         """only_with: leave out records that have none of the chosen columns."""
         self.columns: Sequence[Column] = (*HEAD, *chosen)
+        self._as_sent = {column.field: column.name for column in chosen if column.as_sent}
         self._by_field = {column.field: column for column in chosen if column.field}
+        self._file = ("", "")
         self._comment = COMMENT in chosen
         self._only_with = only_with
 
     def take(self, file: str, record: Decoded) -> Sequence[Row]:
         """Return the record's row."""
+        if file != self._file[0]:
+            self._file = (file, plain(file))
         row: Row = {
-            FILE.name: plain(file),
+            FILE.name: self._file[1],
             NUMBER.name: record.number,
             TIME.name: record.time_ns,
             INTERFACE.name: record.interface,
         }
         heads = len(row)
-        by_field = self._by_field
+        as_sent, by_field = self._as_sent, self._by_field
         for name, sent in record.fields.items():
-            column = by_field.get(name)
-            if column is not None and (value := column.values(sent)) is not None:
+            if (same := as_sent.get(name)) is not None and not isinstance(sent, list):
+                row[same] = sent  # the common case, short
+            elif (column := by_field.get(name)) is not None and (value := column.values(sent)) is not None:
                 row[column.name] = value
         if self._comment and record.comment:
             row[COMMENT.name] = plain(record.comment)

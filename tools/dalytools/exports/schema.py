@@ -48,6 +48,11 @@ class Column:
         """Return the names that people have for it: its own, and its field's, with and without ``daly.``."""
         return (self.name, self.field, self.field.removeprefix(PREFIX)) if self.field else (self.name,)
 
+    @property
+    def as_sent(self) -> bool:
+        """Tell whether the value of a field stands in the table as it is."""
+        return bool(self.field) and not (self.several or self.words or self.nothing)
+
     def value(self, sent: Value) -> Value | None:
         """Return what stands in the table for one value of a record's field."""
         if self.words or self.nothing:
