@@ -70,7 +70,10 @@ def run(args: argparse.Namespace) -> int:
     for some, survey in zip(sets, surveys, strict=True):
         if not survey.streams:
             raise Problem(f"{', '.join(some)}: no good frame of a Daly bus in what was read")
-    found = [[one for one in findings(survey, wanted.place) if wanted.finding(one)] for survey in surveys]
+    found = [findings(survey, wanted.place) for survey in surveys]
+    # of two, a place is wanted for what it is in either: else what moves in one alone would look as if it had gone
+    kept = {one.place.off_bus() for some in found for one in some if wanted.finding(one)}
+    found = [[one for one in some if one.place.off_bus() in kept] for some in found]
     if not any(found):
         raise Problem("nothing of what was read is what was asked for")
     names = [Path(name).name for name in files]

@@ -18,14 +18,15 @@ if TYPE_CHECKING:
     from dalytools.survey.moves import Moves
     from dalytools.survey.place import Place
 
-VALUE, STARTED, STOPPED, RANGE, ALSO, FEW, SPACING = range(7)
-KINDS: Final = ("value", "began to move", "stands still", "range", "also", "few", "spacing")
+VALUE, MOSTLY, STARTED, STOPPED, RANGE, ALSO, FEW, SPACING = range(8)
+KINDS: Final = ("value", "mostly", "began to move", "stands still", "range", "also", "few", "spacing")
 """From the surest on."""
 _LEAST: Final = 5
 _ENOUGH: Final = 20
 _CHANCE: Final = 0.001
 _NEW: Final = 0.5
 _UNSEEN: Final = 0.1
+_MOSTLY: Final = 0.8
 _SPACED: Final = 1.25
 _ENOUGH_GAPS: Final = 10
 
@@ -131,8 +132,10 @@ def _started(old: Moves, new: Moves, index: int) -> Change | None:
     if min(old.count, new.count) < _ENOUGH:
         return None
     fresh = {value: times for value, times in now.items() if value not in was}
-    text = f"always {_span(was)} before, now {_span(fresh)} too ({sum(fresh.values())} of {new.count} times)"
-    return Change(ALSO, index, index, text)
+    times = sum(fresh.values())
+    mostly = times >= _MOSTLY * new.count
+    text = f"always {_span(was)} before, now {_span(fresh)}{'' if mostly else ' too'} ({times} of {new.count} times)"
+    return Change(MOSTLY if mostly else ALSO, index, index, text)
 
 
 def _stopped(old: Moves, new: Moves, index: int) -> Change | None:

@@ -14,6 +14,7 @@ from dalytools import __version__
 from dalytools.survey.difference_listing import where
 from dalytools.survey.findings import HEADINGS, REQUESTS
 from dalytools.survey.heat import STEPS, byte_heat
+from dalytools.survey.place import MODBUS
 from dalytools.survey.words import held, named, spacing
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ h1 { font-size: 1.5em; margin: .3em 0; overflow-wrap: anywhere; } h2 { font-size
 h3 { font-size: 1em; margin: 0; } .faint { color: var(--faint); }
 .place { background: var(--box); border: 1px solid var(--line); border-radius: 8px; padding: 8px 12px; margin: 8px 0; }
 .place p { margin: 4px 0; overflow-wrap: anywhere; }
-.bytes { display: grid; grid-template-columns: repeat(auto-fill, minmax(76px, 1fr)); gap: 8px; margin: 6px 0; }
+.bytes { display: grid; grid-template-columns: repeat(8, minmax(0, 1fr)); gap: 8px; margin: 6px 0; }
+@media (max-width: 700px) { .bytes { grid-template-columns: repeat(4, 1fr); } }
 .byte { font: 13px/1.4 ui-monospace, monospace; overflow-wrap: anywhere; }
 .bits { display: flex; gap: 1px; } .bits i { flex: 1; height: 16px; border-radius: 2px; }
 .key i { display: inline-block; width: 14px; height: 14px; border-radius: 2px;
@@ -57,7 +59,7 @@ def survey_page(survey: Survey, findings: Sequence[Finding], names: Sequence[str
     ]
     several = len({one.place.bus for one in findings}) > 1
     for group, of_group in groupby(findings, key=lambda one: one.group):
-        places = "\n".join(_place(one, several=several) for one in of_group)
+        places = "\n".join(_places(list(of_group), several=several))
         if group == REQUESTS:
             body.append(f"<details><summary>{_text(HEADINGS[group])}</summary>\n{places}\n</details>")
         else:
@@ -95,6 +97,24 @@ def _page(title: str, body: Sequence[str]) -> str:
     )
 
 
+def _places(findings: Sequence[Finding], *, several: bool) -> Iterator[str]:
+    """Give a box a place; registers in a row that never moved, and of which nothing is said, are one together."""
+    for quiet, some in groupby(findings, key=_is_quiet_register):
+        if not quiet:
+            yield from (_place(one, several=several) for one in some)
+            continue
+        for _, of_one in groupby(some, key=lambda one: (one.place.bus, one.place.who, one.place.dialect)):
+            rows = list(of_one)
+            bus = f"bus {rows[0].place.bus}: " if several else ""
+            words = "; ".join(f"{one.place.number:04X} {one.stream.last.hex().upper()}" for one in rows)
+            head = f"{bus}{rows[0].place.who} {rows[0].place.dialect} registers that never moved"
+            yield f'<div class="place"><h3>{_text(head)}</h3><p><code>{_text(words)}</code></p></div>'
+
+
+def _is_quiet_register(one: Finding) -> bool:
+    return one.place.dialect in MODBUS and one.place.size == 2 and one.constant and not one.claims
+
+
 def _place(one: Finding, *, several: bool) -> str:
     stream = one.stream
     bus = f"bus {one.place.bus}: " if several else ""
@@ -125,11 +145,8 @@ def _bytes(one: Finding) -> Iterator[str]:
             for bit, step in zip(range(7, -1, -1), byte_heat(moves, index), strict=True)
         )
         span, count = held(one.stream, index)
-        values = f"<br>{count} values" if count else ""
-        yield (
-            f'<div class="byte"><span class="faint">d{index}</span><div class="bits">{bits}</div>{span}'
-            f"{values}<br>newest {one.stream.last[index]:02X}</div>"
-        )
+        values = f"<br>{count} values<br>newest {one.stream.last[index]:02X}" if count else ""
+        yield f'<div class="byte"><span class="faint">d{index}</span><div class="bits">{bits}</div>{span}{values}</div>'
 
 
 def _text(text: str) -> str:

@@ -98,6 +98,15 @@ def test_a_state_that_came_once_and_stayed(tmp_path: Path) -> None:
     assert changes(found) == [("also", 0, 0, "always 00 before, now 02 too (50 of 200 times)")]
 
 
+def test_a_knob_turned_in_the_middle_of_the_second_capture(tmp_path: Path) -> None:
+    found = compared(
+        tmp_path,
+        {0xE0: lambda _bus, _poll: b"\x5b" + bytes(7)},
+        {0xE0: lambda _, poll: bytes((0x5A if poll else 0x5B, *bytes(7)))},
+    )
+    assert changes(found) == [("mostly", 0, 0, "always 5B before, now 5A (199 of 200 times)")]
+
+
 def test_seen_too_seldom_to_be_sure(tmp_path: Path) -> None:
     found = compared(
         tmp_path, {0xE0: lambda _bus, _poll: bytes(8)}, {0xE0: lambda _bus, _poll: b"\1" + bytes(7)}, polls=3
@@ -105,6 +114,23 @@ def test_seen_too_seldom_to_be_sure(tmp_path: Path) -> None:
     assert changes(found) == [
         ("few", 0, 0, "00 before, 01 now (bit 0), but seen 3 and 3 times only: it may move anyway")
     ]
+
+
+def test_what_is_unknown_in_one_alone_is_not_gone_from_the_other(tmp_path: Path) -> None:
+    """The reserved byte 7 of 0x94 moves in the first only."""
+    captures = [
+        str(Bus(30, seed).write(tmp_path / f"{seed}.pcapng", {0x94: partial(status, moves)}))
+        for seed, moves in ((1, 1), (2, 0))
+    ]
+    out = tmp_path / "difference.json"
+    assert main(["survey", "--diff", *captures, "--json", str(out), "--unknown"]) == 0
+    found = json.loads(out.read_text("utf-8"))
+    assert (found["only_before"], found["only_now"]) == ([], [])
+    assert [place["name"] for place in found["changed"]] == ["board 1 reply 0x94"]
+
+
+def status(moves: int, poll: int) -> bytes:
+    return bytes((16, 2, 0, 0, 2, 0, 37, 200 * moves * (poll % 2)))
 
 
 def test_the_same_capture_twice(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
