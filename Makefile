@@ -38,9 +38,9 @@ soak: ## a million records, good and damaged, through both readings, in every Wi
 	$(DEV_SETUP)
 	@$(PY) -m bench.soak $(ARGS)
 
-fuzz: ## a million mutated packets through the dissector, in every Wireshark that make matrix fetched
+fuzz: ## mutated packets through the dissector, in every Wireshark of make matrix; make fuzz ARGS=files: damaged files
 	$(DEV_SETUP)
-	@$(PY) -m bench.fuzz $(ARGS)
+	@$(PY) -m bench.$(if $(filter files,$(ARGS)),hostile,fuzz) $(filter-out files,$(ARGS))
 
 crash: ## kills, torn ends, a full disk: what is left of a capture; and how fast Wireshark's capture tool is
 	$(DEV_SETUP)

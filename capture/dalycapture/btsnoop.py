@@ -14,7 +14,7 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Final
 
-from dalycapture.captured import CapturedPacket
+from dalycapture.captured import CapturedPacket, possible
 from dalycapture.errors import CaptureError, TruncatedError
 from dalycapture.interface import Interface
 from dalycapture.writer import counted
@@ -76,4 +76,6 @@ def read_btsnoop(source: Source, told: Told | None = None) -> Iterator[CapturedP
         _, _, flags, _, time_us = _RECORD.unpack(record)
         number += 1
         link_type, whole = _packet(kind, flags, data)
-        yield CapturedPacket(number=number, time_ns=(time_us - _EPOCH_US) * 1000, data=whole, link_type=link_type)
+        yield CapturedPacket(
+            number=number, time_ns=possible((time_us - _EPOCH_US) * 1000), data=whole, link_type=link_type
+        )

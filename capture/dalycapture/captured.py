@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from dalyref.packet import Packet
 
@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dalycapture.interface import Interface
+
+
+MOST_NS: Final = 0xFFFFFFFF_FFFFFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,11 @@ class Statistics:
     received: int | None = None
     dropped: int | None = None
     os_dropped: int | None = None
+
+
+def possible(time_ns: int) -> int:
+    """Return ns since 1970; 0, which is no time, for what no capture can hold: before 1970, or more than 64 bits."""
+    return time_ns if 0 <= time_ns <= MOST_NS else 0
 
 
 def _ignore(_: object) -> None: ...

@@ -36,6 +36,9 @@ _HEADER = "IHHIIII"
 _RECORD = "IIII"
 
 
+_MOST_SECONDS: Final = 0xFFFFFFFF
+
+
 class PcapWriter(CaptureWriter):
     """Writes classic pcap, little-endian, one packet a write."""
 
@@ -75,6 +78,8 @@ class PcapWriter(CaptureWriter):
     def _packet(self, time_ns: int, data: bytes, *, interface: int, flags: int, comment: str, dropped: int) -> bytes:
         del interface, flags, comment, dropped  # no place for them
         seconds, rest = divmod(time_ns, 1_000_000_000)
+        if seconds > _MOST_SECONDS:
+            seconds = rest = 0  # the format has 32 bits for them: better no time than a wrong one
         return struct.pack("<" + _RECORD, seconds, rest // self._unit, len(data), len(data)) + data
 
     def write_statistics(

@@ -32,7 +32,7 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from dalycapture.captured import CapturedPacket, Statistics, Told
+from dalycapture.captured import CapturedPacket, Statistics, Told, possible
 from dalycapture.errors import CaptureError, TruncatedError
 from dalycapture.interface import Interface
 from dalycapture.writer import CaptureWriter, counted
@@ -55,6 +55,8 @@ NUMBERED_BLOCKS: Final = frozenset((0x9, 0x204, 0x216, 0xBAD, 0x40000BAD))
 """Blocks without a packet of ours that Wireshark shows as one: journal, system call, custom. They take a number."""
 
 BYTE_ORDER_MAGIC: Final = 0x1A2B3C4D
+MOST_INTERFACES: Final = 16384
+"""Of a file: each is a bus of its own to its readers, with what they remember of it."""
 MAX_BLOCK: Final = 16 << 20
 
 END, COMMENT = 0, 1
@@ -175,10 +177,11 @@ class Side:
     offset_s: int = 0
 
     def nanoseconds(self, ticks: int) -> int:
-        """Return a time stamp in ns since 1970 UTC."""
+        """Return a time stamp in ns since 1970 UTC; 0 where it is no possible time."""
         power = self.resolution & 0x7F
         scaled = ticks * 1_000_000_000
-        return (scaled >> power if self.resolution & 0x80 else scaled // 10**power) + self.offset_s * 1_000_000_000
+        since = scaled >> power if self.resolution & 0x80 else scaled // 10**power
+        return possible(since + self.offset_s * 1_000_000_000)
 
 
 class PcapngReader:
@@ -273,6 +276,8 @@ class PcapngReader:
     def _interface(self, body: bytes) -> None:
         if len(body) < 8:
             raise self._damaged("an interface description that is too short")
+        if self.interfaces >= MOST_INTERFACES:
+            raise self._damaged(f"more than {MOST_INTERFACES} interfaces, as no program writes them")
         link_type, _, snap_length = struct.unpack_from(self.order + "HHI", body)
         side = Side(self.interfaces, link_type, snap_length)
         for code, value in self._options(body, 8):

@@ -121,6 +121,7 @@ class Reframer:
         self._options = options or Options()
         self._bus = bus
         self._lines: dict[tuple[int, Direction], _Line] = {}
+        self._holding: dict[tuple[int, Direction], _Line] = {}  # those with bytes in no record yet
         self._heap: list[_Ready] = []
         self._place = 0
         self._interfaces: list[Interface] = []
@@ -138,7 +139,9 @@ class Reframer:
             self._release(packet.time_ns)
             return
         key = (packet.interface, packet.direction)
-        line = self._lines.setdefault(key, _Line(self._options))
+        line = self._lines.get(key)
+        if line is None:
+            line = self._lines[key] = _Line(self._options)
         self._records(line, line.feed(packet))
         if packet.data:
             self.result.packets += 1
@@ -146,9 +149,11 @@ class Reframer:
         else:
             self.result.events += 1
             self._pass(packet)
-        for other in self._lines.values():
+        self._holding[key] = line
+        for other in self._holding.values():
             if other is not line and other.stream.silent_at(packet.time_ns, _LATE_NS):
                 self._records(other, other.stream.flush())
+        self._holding = {at: held for at, held in self._holding.items() if held.waits_from_ns is not None}
         self._release(packet.time_ns)
 
     def finish(self) -> Reframed:
@@ -202,7 +207,7 @@ class Reframer:
 
     def _release(self, now_ns: int) -> None:
         """Write what nothing that is still to come can precede."""
-        held = [since for line in self._lines.values() if (since := line.waits_from_ns) is not None]
+        held = [since for line in self._holding.values() if (since := line.waits_from_ns) is not None]
         until = min([*held, now_ns])
         while self._heap and (self._heap[0].at_ns <= until or len(self._heap) > _MOST_HELD):
             self._write(heapq.heappop(self._heap))

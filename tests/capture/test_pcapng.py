@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dalycapture import pcapng
 from dalycapture.captured import Statistics, Told
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError, TruncatedError
@@ -304,6 +305,14 @@ def test_several_sections_have_interfaces_of_their_own() -> None:
     data = section() + side(147) + side(148) + packet(interface=1) + section(">") + side(1, order=">")
     packets = read(data + packet(order=">"))
     assert [(p.number, p.interface, p.link_type) for p in packets] == [(1, 1, 148), (2, 2, 1)]
+
+
+def test_interfaces_without_end_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is a bus to whoever reads on; a capture of nothing else would fill the memory."""
+    monkeypatch.setattr(pcapng, "MOST_INTERFACES", 3)
+    assert len(read(section() + side() * 3 + packet())) == 1
+    with pytest.raises(CaptureError, match="more than 3 interfaces"):
+        read(section() + side() * 2 + section() + side() * 2 + packet())
 
 
 def test_simple_and_obsolete_packets_and_unknown_blocks() -> None:

@@ -79,6 +79,44 @@ def test_pcap_of_others(order: str, magic: int, unit: int, tmp_path: Path) -> No
     assert (one.number, one.time_ns, one.data, one.link_type) == (1, 7 * 10**9 + 9 * unit, b"ab", 147)
 
 
+HCI = bytes.fromhex("0400") + b"\x01\x00"
+
+
+@pytest.mark.parametrize("microseconds", [0, -1, (1 << 63) - 1, -(1 << 63)])
+def test_a_btsnoop_time_that_no_capture_can_hold_is_no_time(microseconds: int, tmp_path: Path) -> None:
+    """Microseconds since the year 0; what is before 1970 or too far away can't be written again."""
+    path = tmp_path / "x.btsnoop"
+    record = struct.pack(">IIIIq", 4, 4, 0, 0, microseconds) + HCI
+    path.write_bytes(b"btsnoop\0" + struct.pack(">II", 1, 1002) + record)
+    (one,) = read_capture(path)
+    assert one.time_ns == 0
+
+
+@pytest.mark.parametrize(("resolution", "offset"), [(0, 0), (6, -(1 << 62)), (6, 1 << 62), (0x80, 0)])
+def test_a_pcapng_time_that_no_capture_can_hold_is_no_time(resolution: int, offset: int, tmp_path: Path) -> None:
+    path = tmp_path / "x.pcapng"
+    options = struct.pack("<HHB3xHHqI", 9, 1, resolution, 14, 8, offset, 0)
+    interface = struct.pack("<HHI", 147, 0, 0) + options
+    packet = struct.pack("<IIIII", 0, 0x7FFFFFFF, 0xFFFFFFFF, 4, 4) + b"\xa5\x40\x90\x08"
+    blocks = [(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1)), (1, interface), (6, packet)]
+    path.write_bytes(
+        b"".join(
+            struct.pack("<II", kind, len(body) + 12) + body + struct.pack("<I", len(body) + 12) for kind, body in blocks
+        )
+    )
+    (one,) = read_capture(path)
+    assert one.time_ns == 0
+
+
+def test_classic_pcap_has_32_bits_for_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "x.pcap"
+    with open_writer(path, "pcap") as writer:
+        writer.add_interface(tap("x"))
+        for seconds in (0xFFFFFFFF, 1 << 32):
+            writer.write_packet(seconds * 10**9 + 5, b"x")
+    assert [packet.time_ns for packet in read_capture(path)] == [0xFFFFFFFF * 10**9 + 5, 0]
+
+
 def test_scapy_reads_and_writes_pcap(tmp_path: Path) -> None:
     from scapy.utils import RawPcapReader, RawPcapWriter
 

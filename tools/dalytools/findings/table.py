@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 from dalytools.findings.finding import Severity
 from dalytools.findings.moment import clock
 from dalytools.findings.rules import RULES
-from dalytools.terminal_text import plain
+from dalytools.terminal_text import counted, plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -22,6 +22,8 @@ _COLOURS = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOT
 _WIDTH = 120
 """Columns where no terminal says how many it has: in a log, in a file."""
 _LEAST_WIDTH = 60
+MOST_SHOWN = 200
+"""Findings of a file: a hostile one has thousands, and nobody reads them here."""
 
 
 def console(out: TextIO, *, colour: bool | None = None) -> Console:
@@ -60,7 +62,7 @@ def show(findings: Sequence[Finding], to: Console) -> None:
     table.add_column("when", no_wrap=True)
     table.add_column("what, and what to do", overflow="fold", ratio=1)
     advised: set[tuple[str, str]] = set()
-    for finding in findings:
+    for finding in findings[:MOST_SHOWN]:
         words = Text(plain(finding.text))
         for example in finding.examples:
             words.append(f"\n{plain(example)}", "bright_black")
@@ -75,6 +77,9 @@ def show(findings: Sequence[Finding], to: Console) -> None:
             words,
         )
     to.print(table)
+    if len(findings) > MOST_SHOWN:
+        more = counted(len(findings) - MOST_SHOWN, "more finding")
+        to.print(f"and {more}; --json FILE has all of them", soft_wrap=True)
 
 
 def when(tally: Tally) -> str:

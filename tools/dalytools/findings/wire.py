@@ -35,6 +35,8 @@ _EVENTS = (
 )
 """How the sniffer's events begin (dalycapture.sniffer), and the rule each breaks."""
 _MOST_SAID = 200
+_A5 = 0xA5
+"""How a frame begins: where a capture does so too, it did not join in the middle of one."""
 _CAN = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV, can_foreign.DEYE, can_foreign.AMBIGUOUS))
 _ON_CAN = "a pack may send an inverter's frames by itself: a client must tell them from Daly's by their identifiers"
 _EXAMPLES = 3
@@ -106,7 +108,7 @@ class Wire(Watch):
             detail = str(record.fields.get("daly.foreign", ""))
             self._foreign[Place(bus, detail=detail)].add(record.number, record.time_ns)
         elif record.kind in _DAMAGED:
-            if line.begun or record.kind is Kind.BAD_CHECKSUM:
+            if line.begun or record.kind is Kind.BAD_CHECKSUM or record.data[0] == _A5:
                 line.last = record
             else:
                 line.total -= len(record.data)  # joined in the middle of a frame

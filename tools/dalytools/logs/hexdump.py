@@ -17,7 +17,8 @@ from typing import Final
 from dalytools.logs.entry import Entry, PlainLineLog
 
 _LINE = re.compile(
-    r"\s*(?:0x)?(?P<at>[0-9A-Fa-f]{6,16}):?[ \t]+(?P<hex>[0-9A-Fa-f]{2,4}(?:[ ]{1,2}[0-9A-Fa-f]{2,4})*)[ ]*"
+    r"\s*(?:0x)?(?P<at>[0-9A-Fa-f]{6,16}):?[ \t]+"
+    r"(?P<hex>(?:[0-9A-Fa-f]{2}){1,2}(?:[ ]{1,2}(?:[0-9A-Fa-f]{2}){1,2})*)[ ]*"
     r"(?P<ascii>(?:[ ]{2,}|\||>).*)?"
 )
 _END = re.compile(r"\s*[0-9A-Fa-f]{6,16}:?\s*")

@@ -52,7 +52,8 @@ FOUND_BY = {
     "echo": Rule(("echo",), 0.01, 0.01),
     "zero_reply": Rule(("zero-reply",), 0.01, 0.3),
     "damaged": Rule(("damaged", "line-errors"), 0.03, 0.3),
-    "collision": Rule(("damaged", "line-errors"), 0.1, 0.3),
+    # Two that begin at once can sum up right: a reply of nobody. One right behind the other harms no byte.
+    "collision": Rule(("damaged", "line-errors", "zero-reply", "unasked", "unanswered"), 0.1, 0.3),
     "cut_burst": Rule(("burst-cut-off",), 0.0, 0.5),
     "skipped_frame": Rule(("burst-missing",)),
     "repeated_frame": Rule(("burst-repeat",)),
@@ -72,7 +73,7 @@ CAUSES = {
     "late": ("late",),
     "wrong-board": ("other_board",),
     "echo": ("echo",),
-    "zero-reply": ("zero_reply",),
+    "zero-reply": ("zero_reply", "collision"),
     "burst-missing": ("skipped_frame", "damaged", "collision"),
     "burst-repeat": ("repeated_frame",),
     "burst-cut-off": ("cut_burst", "damaged", "collision"),

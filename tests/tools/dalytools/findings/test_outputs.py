@@ -15,6 +15,7 @@ from tests.tools.dalytools.findings.injected import CASES, CLEAN, LATER, Heard, 
 from tests.tools.dalytools.made import SAMPLES
 
 from dalytools.cli import main
+from dalytools.findings import table
 from dalytools.findings.rules import RULES
 
 if TYPE_CHECKING:
@@ -88,6 +89,17 @@ def test_for_people(clean: str, silent: str, capsys: pytest.CaptureFixture[str])
     quiet = capsys.readouterr().out
     assert "unanswered" not in quiet
     assert clean not in quiet
+
+
+def test_a_hostile_number_of_findings_is_not_listed(
+    silent: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "MOST_SHOWN", 1)
+    assert check(silent) == 1
+    shown = capsys.readouterr().out
+    assert "silent" in shown
+    assert "unanswered" not in shown
+    assert "and 1 more finding; --json FILE has all of them" in shown
 
 
 def test_rules_are_listed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

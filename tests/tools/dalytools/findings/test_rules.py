@@ -184,6 +184,12 @@ def test_what_the_ends_of_a_capture_cut_is_no_damage(tmp_path: Path) -> None:
     assert search(path) == []
 
 
+def test_a_frame_cut_off_at_the_very_beginning_is_damage(tmp_path: Path) -> None:
+    """The capture holds its first byte: it did not join in the middle."""
+    path = capture(tmp_path / "first.pcapng", [Heard(-5, PACK[:20]), *CLEAN])
+    assert one(search(path), "damaged").tally.first_packet == 1
+
+
 def test_a_write_says_what_and_a_password_is_not_told(tmp_path: Path) -> None:
     packets = [*CLEAN, Heard(5, MOS_ON), Heard(5.05, a5(1, 0xD9, "01")), Heard(6, MOS_OFF), Heard(6.05, a5(1, 0xD9))]
     write = one(search(capture(tmp_path / "write.pcapng", packets)), "write")

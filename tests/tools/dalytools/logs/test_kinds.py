@@ -303,6 +303,12 @@ def test_hex_dumps() -> None:
     assert importer.tally.not_understood == 1  # it does not go on there
 
 
+def test_a_dump_with_half_a_byte_is_not_understood() -> None:
+    _, packets, importer = read("00000000: a540 9008 0000\n00000006: 000 0000\n")
+    assert b"".join(part for *_, part in packets) == bytes.fromhex("a54090080000")
+    assert importer.tally.not_understood == 1
+
+
 def test_every_kind_says_what_it_is() -> None:
     for name, made in KINDS.items():
         assert made().name == name
