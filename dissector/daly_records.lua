@@ -197,15 +197,16 @@ function M.event(cutter)
   end
 end
 
---- Take what has become certain. `data`: new bytes; `final`: the segment ends behind them (silence, or the end).
+--- Take what has become certain. `data`: new bytes; `final`: the segment ends behind them (silence, or the end);
+-- `decide`: a good window waits for no neighbour (docs/wires.md 4).
 -- Returns a list of { kind, first, last, dialect, name }; cutter.waiting tells whether a good window is held back.
-function M.take(cutter, data, final)
+function M.take(cutter, data, final, decide)
   local buf = cutter.buf .. data
   local base, n, start, scan = cutter.base, #buf, 1, cutter.scan
   local cuts, known, out = cutter.cuts, cutter.known, {}
   cutter.waiting = false
   while start <= n do
-    local s, e, dialect = next_frame(buf, scan, n, final)
+    local s, e, dialect = next_frame(buf, scan, n, final or decide)
     if not s then
       scan, cutter.waiting = e, dialect
       break

@@ -16,22 +16,30 @@ local M = {}
 
 local ONE_MORE_SEGMENT = 0x0FFFFFFF -- DESEGMENT_ONE_MORE_SEGMENT, which not every version gives Lua
 
+local stream_number = Field.new("tcp.stream")
+
 local capture -- options, buses by connection, results by slot (see daly_streams)
 local slots -- of frames, see feed()
+local held -- by bus and side: bytes that were undecided, and when they came; see begins()
 
 --- Begin a capture. `with`: see daly_streams.capture.
 function M.init(with)
   capture = streams.capture(with)
-  slots = {}
+  slots, held = {}, {}
 end
 
--- The bus of the connection, the same for both directions, and which end sent this packet.
+-- The bus of the connection, the same for both directions, and which end sent this packet. Wireshark numbers them,
+-- and begins a new one where the same ends connect again; it says so only where it makes a tree in the first pass.
 local function bus_of(pinfo)
   local from = tostring(pinfo.src) .. " " .. pinfo.src_port
   local to = tostring(pinfo.dst) .. " " .. pinfo.dst_port
   local name, side = from .. " " .. to, 0
   if to < from then
     name, side = to .. " " .. from, 1
+  end
+  local stream = stream_number()
+  if stream then
+    name = stream.value
   end
   local bus = capture.buses[name]
   if not bus then
@@ -41,34 +49,60 @@ local function bus_of(pinfo)
   return bus, side
 end
 
--- The records that are whole, and how many bytes at the end may begin one that is not.
+-- The records that are decided, and how many bytes at the end are not: those of a gap whose end may still become a
+-- frame. A good frame does not wait for its neighbour (docs/wires.md 4).
 local function cut(raw)
   local cutter = records.new()
-  local found = records.take(cutter, raw, false)
-  local held = #raw - (cutter.base + cutter.scan - 1) + 1
-  if cutter.waiting then
-    -- A good frame that only waits to see its neighbour: it is one unless more comes.
-    return records.alone(raw), 0
-  end
-  if cutter.base <= #raw - held then
-    local before = records.as_gap(raw:sub(cutter.base, #raw - held), cutter.base)
-    for i = 1, #before do
-      found[#found + 1] = before[i]
+  local found = records.take(cutter, raw, false, true)
+  if cutter.scan > #cutter.buf then
+    local rest = records.take(cutter, "", true)
+    for i = 1, #rest do
+      found[#found + 1] = rest[i]
     end
   end
   for i = 1, #found do
     found[i].at, found[i].length = found[i].first - 1, found[i].last - found[i].first + 1
   end
-  return found, held
+  return found, #cutter.buf
+end
+
+-- When each byte came: a list of { at = position, time }. What a packet left undecided is handed to us again, in front of
+-- the next bytes of its direction, as if it were theirs; unless bytes between were lost.
+local function begins(bus, side, raw, left, time)
+  local sides = held[bus] or {}
+  held[bus] = sides
+  local before, times = sides[side], {}
+  if before and raw:sub(1, #before.bytes) == before.bytes then
+    times = before.times
+  else
+    before = nil
+  end
+  times[#times + 1] = { at = before and #before.bytes or 0, time = time }
+  sides[side] = nil
+  if left > 0 then
+    local first, kept = #raw - left, {}
+    for i = 1, #times do
+      local until_at = times[i + 1] and times[i + 1].at or #raw
+      if until_at > first then
+        kept[#kept + 1] = { at = math.max(0, times[i].at - first), time = times[i].time }
+      end
+    end
+    sides[side] = { bytes = raw:sub(first + 1), times = kept }
+  end
+  return times
 end
 
 -- Tell the bus, once, about the frames among these records; they get their slots. What Wireshark hands us at once may
 -- be cut otherwise when a packet is looked at again, so a frame is known by its packet, its bytes and its place among
 -- equals.
-local function feed(items, raw, pinfo)
-  local number, bus, side = pinfo.number, nil, nil
-  local results = capture.results
+local function feed(items, raw, left, pinfo)
+  local number, results = pinfo.number, capture.results
   results.latest = math.max(results.latest, pinfo.rel_ts)
+  local bus, side, times
+  if not pinfo.visited then
+    bus, side = bus_of(pinfo)
+    times = begins(bus, side, raw, left, pinfo.rel_ts)
+  end
   local seen = {}
   for i = 1, #items do
     local item = items[i]
@@ -79,10 +113,11 @@ local function feed(items, raw, pinfo)
       if not slots[key] and not pinfo.visited then
         capture.slots = capture.slots - 1
         slots[key] = capture.slots
-        if not bus then
-          bus, side = bus_of(pinfo)
+        local began = 1
+        while times[began + 1] and times[began + 1].at <= item.at do
+          began = began + 1
         end
-        bus_module.feed(bus, slots[key], number, bytes, pinfo.rel_ts, pinfo.rel_ts, side, capture)
+        bus_module.feed(bus, slots[key], number, bytes, times[began].time, pinfo.rel_ts, side, capture)
       end
       item.slot = slots[key] or 0
     end
@@ -96,19 +131,19 @@ function M.dissect(buffer, pinfo, parent, handle)
   if length == 0 then
     return 0
   end
-  local items, held = cut(raw)
-  if held > 0 then
+  local items, left = cut(raw)
+  if left > 0 then
     if pinfo.can_desegment > 0 then
-      pinfo.desegment_offset = length - held
+      pinfo.desegment_offset = length - left
       pinfo.desegment_len = ONE_MORE_SEGMENT
     else
-      items = records.alone(raw)
+      items, left = records.alone(raw), 0
     end
   end
+  feed(items, raw, left, pinfo)
   if #items == 0 then
     return length
   end
-  feed(items, raw, pinfo)
   view.look(parent, handle, capture.results, pinfo.visited, "tcp")
   view.several(parent, buffer, raw, items, pinfo)
   return length

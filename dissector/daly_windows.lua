@@ -139,6 +139,8 @@ local function modbus_lengths(buf, p, n)
     local answered = answers and 8 or nil
     if not asks then
       return dialect, answered
+    elseif b4 and b4 > 0 then
+      return dialect, answered or 0 -- the count is above 255
     elseif not b5 then
       return dialect, nil
     end

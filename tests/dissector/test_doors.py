@@ -220,6 +220,46 @@ def test_two_connections_are_two_buses(tshark: Tshark, open_folder: Path) -> Non
     assert rows == [[""], ["1"], [""]]
 
 
+def test_the_same_ends_connected_again_are_another_bus(tshark: Tshark, open_folder: Path) -> None:
+    """A reply after a new SYN belongs to no request of the connection before (told by a first pass with a tree)."""
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    connection.send(0, "", at=77777)
+    connection.packets[-1][TCP].flags = "S"
+    connection.send(1, REPLY)
+    words = ("-2", "-Y", "frame", *PORTS)
+    rows = ask(tshark, connection.save(), *words, names=["daly.kind", "daly.request_in"])
+    assert rows == [["frame", ""], ["", ""], ["frame", ""]]
+
+
+def test_a_reply_in_pieces_began_with_its_first(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)  # at 0
+    for start in (0, 6, 24):  # at 10, 20 and 30 ms
+        connection.send(1, REPLY[start : {0: 6, 6: 24, 24: 26}[start]])
+    rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.response_time"])
+    assert rows == [[""], [""], [""], ["0.01"]]
+
+
+def test_a_damaged_frame_whose_end_may_begin_another_is_one_piece(tshark: Tshark, open_folder: Path) -> None:
+    connection = Connection(open_folder)
+    connection.send(1, REPLY[:24] + "d2")  # D2 may be the first byte of a Modbus frame
+    connection.send(1, REPLY)
+    rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.kind"])
+    assert rows == [[""], ["bad_checksum,frame"]]
+
+
+def test_a_good_frame_does_not_wait_for_its_neighbour(tshark: Tshark, open_folder: Path) -> None:
+    """A frame inside which another could begin; and behind it the beginning of one that the next segment completes."""
+    odd = a5(1, 0x90, "02a5010890300200")
+    connection = Connection(open_folder)
+    connection.send(1, odd)
+    connection.send(1, odd + REPLY[:8])
+    connection.send(1, REPLY[8:])
+    rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.kind"])
+    assert rows == [["frame"], ["frame"], ["frame"]]
+
+
 D2_READ = "d203000c000157aa"
 
 

@@ -58,6 +58,8 @@ class Decoded:
     """The packet's comment, of an event its text: not from the wire, and not to be trusted."""
     connection: str = ""
     """Bluetooth, TCP: as the packet names it."""
+    held: bool = False
+    """TCP: an incomplete record, given up because bytes behind it are lost or the capture ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +199,7 @@ class Decoder:
             packet.transport,
             packet.comment,
             connection=packet.connection,
+            held=located.held,
         )
         self._hold(decoded, slate)
 

@@ -91,7 +91,7 @@ class FileOrder(Generic[T]):
 
     def finish(self) -> Iterator[Located | T]:
         """Take the end of the file; yield all that was held."""
-        for stream in self._waiting.values():
+        for stream in self._streams.values():
             self._order(stream.flush())
         self._waiting.clear()
         yield from self.released()

@@ -16,7 +16,7 @@ end of the segment follows it directly, for a frame cut off and the one behind i
 from __future__ import annotations
 
 from dalyref import a5, bluetooth_module, heads, modbus
-from dalyref.gaps import Gap
+from dalyref.gaps import LONGEST_JUNK, Gap
 from dalyref.kinds import Dialect, Kind, Record
 
 __all__ = ["Dialect", "Kind", "Record", "Splitter", "split"]
@@ -60,10 +60,11 @@ def _stands(data: bytes, start: int, end: int, *, closed: bool) -> bool | None:
     return False if inner else None
 
 
-def _choose(data: bytes, start: int, end: int, *, closed: bool) -> tuple[int, int]:
+def _choose(data: bytes, start: int, end: int, *, closed: bool, decide: bool) -> tuple[int, int]:
     """Choose the first frame that begins at `start` or later: (its first byte, its end).
 
     Without one: (the first position where one could still begin, 0). `closed`: the segment ends at `end`.
+    `decide`: so it does for a good window that waits for its neighbour.
     """
     barred: set[int] = set()
     while True:
@@ -83,7 +84,7 @@ def _choose(data: bytes, start: int, end: int, *, closed: bool) -> tuple[int, in
         if first < 0:
             return (end if closed else open_from), 0
         if data[first] == a5.START:
-            stands = _stands(data, first, end, closed=closed)
+            stands = _stands(data, first, end, closed=closed or decide)
             if stands is None:
                 return min(open_from, first), 0
             if not stands:
@@ -131,10 +132,13 @@ class Splitter:
         """Tell whether the bytes so far end in what may still become a frame."""
         return self._scan < len(self._data)
 
-    def feed(self, data: bytes) -> list[Record]:
-        """Take the next bytes of the stream; return the records that are now certain."""
+    def feed(self, data: bytes, *, decide: bool = False) -> list[Record]:
+        """Take the next bytes of the stream; return the records that are now certain.
+
+        decide: a good frame does not wait for its neighbour's bytes, and a gap is handed over whole (docs/wires.md, 4).
+        """
         self._data = self._data + data if self._data else bytes(data)
-        return self._advance(closed=False)
+        return self._advance(closed=False, decide=decide)
 
     def passed(self, count: int) -> None:
         """Take note of `count` bytes, whole frames, that were cut elsewhere while nothing was held."""
@@ -153,7 +157,7 @@ class Splitter:
         self._scan = 0
         return out
 
-    def _advance(self, *, closed: bool) -> list[Record]:
+    def _advance(self, *, closed: bool, decide: bool = False) -> list[Record]:
         out: list[Record] = []
         data, base = self._data, self._base
         end = len(data)
@@ -173,10 +177,11 @@ class Splitter:
             if at == end:
                 scan = at
                 break
-            start, stop = _choose(data, max(at, scan), end, closed=closed)
+            start, stop = _choose(data, max(at, scan), end, closed=closed, decide=decide)
             if not stop:
                 scan = start
-                at = self._gap.cut(data, at, start, base, out, closed=closed)
+                if not decide or start - at > LONGEST_JUNK:
+                    at = self._gap.cut(data, at, start, base, out, closed=closed)
                 break
             if start > at:
                 self._gap.cut(data, at, start, base, out, closed=True)

@@ -37,6 +37,8 @@ class Located:
     """When its first byte began."""
     end_ns: int
     """When its last byte had ended."""
+    held: bool = False
+    """TCP: given up, because bytes behind it are lost or the capture ended."""
 
 
 class Stream:
@@ -56,7 +58,8 @@ class Stream:
     @property
     def waits_from(self) -> int | None:
         """The number of the packet with the first byte that is in no record yet."""
-        return self._chunks[0][1].number if self._splitter.pending else None
+        # What TCP holds counts to the packet that will decide it.
+        return self._chunks[0][1].number if self._splitter.pending and self._transport != "tcp" else None
 
     def silent_at(self, time_ns: int, longer_ns: int = 0) -> bool:
         """Tell whether a packet that begins at `time_ns` comes after silence, by `longer_ns` more than needed."""
@@ -85,6 +88,14 @@ class Stream:
         self._chunks.append((self._length, packet))
         self._length += len(packet.data)
         self._end_ns = packet.time_ns + self._lasts_ns(len(packet.data))
+        if self._transport == "tcp":
+            records = self._splitter.feed(packet.data, decide=True)
+            if not self._splitter.begun:  # a gap ends here
+                records += self._splitter.flush()
+            located = self._locate(records)
+            for item in located:
+                item.packet = packet
+            return out + located
         records = self._splitter.feed(packet.data)
         if records:
             out += self._locate(records)
@@ -98,7 +109,10 @@ class Stream:
 
     def flush(self) -> list[Located]:
         """Silence or the end: return what is held."""
-        return self._locate(self._splitter.flush())
+        located = self._locate(self._splitter.flush())
+        for item in located:
+            item.held = self._transport == "tcp"
+        return located
 
     def _lasts_ns(self, count: int) -> int:
         """Return how long `count` characters take, in ns."""

@@ -30,7 +30,9 @@ from dalytools.field_names import FIELD_NAMES
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
 from dalytools.wire_times import preferences
+from dalytools.wires import choice
 from dalytools.wires.carriers import NOT_READ, Carriers
+from dalytools.wires.choice import Choice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -77,6 +79,8 @@ class Comparison:
     differences: list[Difference] = field(default_factory=list[Difference])
     broken: str = ""
     """One line, when the capture could be read only in part."""
+    left_out: int = 0
+    """TCP connections that were not compared: no setting of Wireshark shows what has both lost and late segments."""
 
     def add(self, difference: Difference) -> None:
         """Note a difference."""
@@ -114,21 +118,28 @@ def compare(
     path: Path,
     *,
     options: Options | None = None,
+    wires: Choice | None = None,
     progress: Callable[[int], None] | None = None,
     listener: Listener | None = None,
 ) -> Comparison:
     """Compare both readings of a capture file.
 
-    options: the constants for both. progress: called now and then
+    options: the constants for both. wires: what the file does not say of its wires. progress: called now and then
     with the number of packets compared. listener: is given all packets of the file, then all records of the reference.
     Raises Problem when the file cannot be read at all, or has no packet of a link type of ours. A file that is cut off
     is compared as far as it goes: ``broken``.
     """
     _refuse_pipes(path)
     result = Comparison()
-    serial = DALY_LINK_TYPES.intersection(_link_types(path, result, listener))
+    wires = wires or Choice()
+    carriers = Carriers(wires)
+    serial = DALY_LINK_TYPES.intersection(_link_types(path, carriers, result, listener))
+    left_out = frozenset(carriers.mixed)
+    result.left_out = len(left_out)
     options = options or Options()
-    arguments = [*preferences(options)]
+    # Where bytes are lost for good, Wireshark shows nothing behind them while it waits to put segments in order.
+    in_order = "FALSE" if carriers.lost else "TRUE"
+    arguments = [*preferences(options), *choice.preferences(wires), "-o", f"tcp.reassemble_out_of_order:{in_order}"]
     if serial:
         arguments += ["-o", f"daly.link_types:{','.join(map(str, sorted(serial)))}"]
     arguments += [
@@ -142,7 +153,7 @@ def compare(
         arguments += ["-e", name]
     # With a filter the first of two passes makes a tree, without which Lua can't tell a packet's interface.
     with _rows(tshark, ["-2", "-Y", "frame", *arguments], result) as rows:
-        _walk(rows, _Fed(path, _Told(options, listener)), result, progress)
+        _walk(rows, _Fed(path, _Told(options, listener), wires, left_out), result, progress)
     told = any(difference.field == _LUA_ERROR for difference in result.differences)
     with _rows(tshark, ["-Y", _LUA_ERROR, *arguments], result) as rows:
         for row in rows:
@@ -156,16 +167,17 @@ def read_alone(
     path: Path,
     *,
     options: Options | None = None,
+    wires: Choice | None = None,
     progress: Callable[[int], None] | None = None,
     listener: Listener,
 ) -> Comparison:
     """Read a capture with the reference decoder alone, where there is no tshark. Arguments and errors as `compare`."""
     _refuse_pipes(path)
     result = Comparison()
-    _link_types(path, result, listener)
-    decoder, carriers = _Told(options or Options(), listener), Carriers()
+    _link_types(path, Carriers(wires), result, listener)
+    decoder, carriers = _Told(options or Options(), listener), Carriers(wires)
     for packet in _packets(path):
-        if _is_ours(packet):
+        if _is_ours(carriers, packet):
             result.packets += 1
             for carrier in carriers.of(packet):
                 _count(decoder.feed(carrier), result)
@@ -251,7 +263,7 @@ def _drain(stream: IO[bytes], into: list[bytes]) -> None:
             kept += len(chunk)
 
 
-def _link_types(path: Path, result: Comparison, listener: Listener | None) -> set[int]:
+def _link_types(path: Path, carriers: Carriers, result: Comparison, listener: Listener | None) -> set[int]:
     """Return the link types of ours in the file, looking at all of it, and whether it reads to its end."""
     ours: set[int] = set()
     others: set[int] = set()
@@ -259,13 +271,18 @@ def _link_types(path: Path, result: Comparison, listener: Listener | None) -> se
     try:
         for packet in read_capture(path):
             packets += 1
-            (ours if _is_ours(packet) else others).add(packet.link_type)
+            if _is_ours(carriers, packet):
+                ours.add(packet.link_type)
+                carriers.of(packet)
+            else:
+                others.add(packet.link_type)
             if listener is not None:
                 listener.packet(packet)
     except CaptureError as error:
         if not packets:
             raise Problem(str(error)) from None
         result.broken = str(error)
+    carriers.finish()
     if not packets:
         raise Problem(f"{path}: the capture holds no packet")
     if not ours:
@@ -274,8 +291,8 @@ def _link_types(path: Path, result: Comparison, listener: Listener | None) -> se
     return ours
 
 
-def _is_ours(packet: Packet) -> bool:
-    return Carriers.reads(packet.link_type) and packet.link_type != TAKEN_LINK_TYPE
+def _is_ours(carriers: Carriers, packet: Packet) -> bool:
+    return carriers.reads(packet.link_type) and packet.link_type != TAKEN_LINK_TYPE
 
 
 def _packets(path: Path) -> Iterator[Packet]:
@@ -288,14 +305,17 @@ def _packets(path: Path) -> Iterator[Packet]:
 class _Fed:
     """The reference's reading of a file, which goes on as far as it is asked to."""
 
-    def __init__(self, path: Path, decoder: _Told) -> None:
+    def __init__(self, path: Path, decoder: _Told, wires: Choice, left_out: frozenset[str]) -> None:
         self.ready: deque[Decoded] = deque()
         self.streams: dict[int, Key] = {}
         """Of packets with something for the decoder, not yet compared: the stream it went to."""
         self.expected: deque[int] = deque()
         """Packets that tshark has to show."""
+        self.passed_over: set[int] = set()
+        """Packets of connections that are not compared."""
         self._packets = _packets(path)
-        self._carriers = Carriers()
+        self._carriers = Carriers(wires)
+        self._left_out = left_out
         self._decoder = decoder
         self._ended = False
 
@@ -315,9 +335,12 @@ class _Fed:
             self._ended = True
             self._feed(self._carriers.finish())
             self.ready.extend(self._decoder.finish())
-        elif _is_ours(packet):
+        elif _is_ours(self._carriers, packet):
             self.expected.append(packet.number)
-            self._feed(self._carriers.of(packet))
+            carriers = self._carriers.of(packet)
+            if self._carriers.connection in self._left_out:
+                self.passed_over.add(packet.number)
+            self._feed(carriers)
 
     def _feed(self, carriers: Iterable[Packet]) -> None:
         for carrier in carriers:
@@ -337,13 +360,19 @@ def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[in
         fed.until(number)
         mine: list[Decoded] = []
         while ready and ready[0].number <= number:
-            mine.append(ready.popleft())
+            record = ready.popleft()
+            if not record.held:  # what TCP holds to the end, Wireshark shows as a TCP segment
+                mine.append(record)
         result.packets += 1
         result.records += len(mine)
         while expected and expected[0] <= number:
             if expected[0] < number:
                 result.add(Difference(expected[0], "packet", "not shown", "present"))
             expected.popleft()
+        if number in fed.passed_over:
+            fed.passed_over.discard(number)
+            fed.streams.pop(number, None)
+            continue
         key = fed.streams.pop(number, None)
         rest = (_Rest(), _Rest()) if key is None else sides.setdefault(key, (_Rest(), _Rest()))
         _packet(number, values[1:], mine, rest, result)

@@ -307,19 +307,3 @@ def test_the_fuzz_gets_past_the_header(tmp_path: Path) -> None:
         return bool(said) and any(ASK in packet.data for packet in packets)
 
     assert find(captures(), late)
-
-
-@pytest.mark.parametrize("command", ["check", "decode", "report"])
-@pytest.mark.parametrize("option", ["--ble-handles", "--tcp-ports"])
-def test_no_option_is_offered_that_nothing_stands_behind(
-    command: str, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Bluetooth and TCP are not read by the reference: an option for them made check find a difference that is none."""
-    with pytest.raises(SystemExit) as ended:
-        main(
-            [command, option, "15", str(CYCLE), "-o", "x"]
-            if command != "check"
-            else [command, option, "15", str(CYCLE)]
-        )
-    assert ended.value.code == 2
-    assert option in capsys.readouterr().err

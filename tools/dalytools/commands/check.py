@@ -28,6 +28,7 @@ from dalytools.progress import progress_bar
 from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from dalyref.options import Options
     from dalytools.findings.baseline import Baseline
     from dalytools.findings.config import Config
+    from dalytools.wires.choice import Choice
 
 SHOWN = 20
 
@@ -85,6 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--junit", metavar="FILE", help="findings for a CI, a test case a rule; - is standard output")
     parser.add_argument("--github", action="store_true", help="findings as annotations of GitHub Actions")
     parser.add_argument("--no-colour", "--no-color", action="store_true", help="as NO_COLOR=1 does")
+    choice.add_arguments(parser)
     wire_times.add_arguments(parser, quiet="--silence")
 
 
@@ -103,6 +106,7 @@ class _Asked:
     """What to check by: command line over configuration over defaults."""
 
     options: Options
+    wires: Choice
     limits: Limits
     severity: dict[str, Severity]
     ignored: frozenset[str]
@@ -119,6 +123,7 @@ class _Asked:
         fail_on: str = args.fail_on or settings.fail_on or str(Severity.ERROR)
         return cls(
             wire_times.read(args, base),
+            choice.read(args),
             limits,
             settings.severity,
             frozenset((*settings.ignore, *args.ignore)),
@@ -198,13 +203,16 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
     try:
         with progress_bar(f"check {plain(Path(name).name)}") as advance:
             if tshark is None:
-                result = read_alone(Path(name), options=asked.options, progress=advance, listener=search)
+                result = read_alone(
+                    Path(name), options=asked.options, wires=asked.wires, progress=advance, listener=search
+                )
             else:
                 listener = search if asked.rules else None
                 result = compare(
                     tshark,
                     Path(name),
                     options=asked.options,
+                    wires=asked.wires,
                     progress=advance,
                     listener=listener,
                 )
@@ -220,6 +228,9 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
     checked.findings, checked.known = weighed(
         everything, asked.severity, asked.ignored, known.keys if known is not None else ()
     )
+    if result.left_out:
+        said = f"{plain(name)}: {counted(result.left_out, 'TCP connection')} with lost and late segments not compared"
+        print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201
     if result.broken:
         said = plain(f"{result.broken}; compared what is there")
         print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201

@@ -22,6 +22,7 @@ from dalytools.progress import progress_bar
 from dalytools.record_lines import line
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
 from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from dalyref.values import Fields
     from dalytools.exports.export import Plan
     from dalytools.time_range import TimeRange
+    from dalytools.wires.choice import Choice
 
 _COLOURS = {
     "request": "cyan",
@@ -61,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT", default="-", help="file to write, - for standard output")
     time_range.add_arguments(parser)
     export.add_arguments(parser)
+    choice.add_arguments(parser)
     wire_times.add_arguments(parser)
 
 
@@ -68,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
     """Decode every file; what could be read of a damaged one is shown before its problem."""
     files: list[str] = args.files
     output: str = args.output
-    options = wire_times.read(args)
+    options, wires = wire_times.read(args), choice.read(args)
+    Carriers(wires)  # says what is missing before anything is written
     if output != "-":
         for name in files:
             if name != "-" and os.path.realpath(name) == os.path.realpath(output):
@@ -80,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         shown = 0
         for name in files:
             said = len(problems)
-            shown += _decode_file(name, options, span, out.put, problems)
+            shown += _decode_file(name, options, span, out.put, problems, wires=wires)
             out.end_file()
             for problem in problems[said:]:
                 print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
@@ -134,10 +138,12 @@ def _decode_file(
     span: TimeRange,
     put: Callable[[str, Decoded], None],
     problems: list[str],
+    *,
+    wires: Choice,
 ) -> int:
     """Put every record of one file out; return how many, and append what is wrong with the file to `problems`."""
     decoder = Decoder(options)
-    carriers = Carriers()
+    carriers = Carriers(wires)
     shown = 0
     others: set[int] = set()
     packets = passed = 0

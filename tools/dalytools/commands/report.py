@@ -20,6 +20,7 @@ from dalytools.report.collect import Collected
 from dalytools.report.page import page
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
 from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", nargs="+", metavar="FILE", help="capture files, in the order of time")
     parser.add_argument("-o", "--output", metavar="OUT.html", required=True, help="page to write")
     parser.add_argument("--title", help="heading of the page (the files' names)")
+    choice.add_arguments(parser)
     wire_times.add_arguments(parser)
 
 
@@ -69,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(name: str, args: argparse.Namespace, collected: Collected, search: Search, problems: list[str]) -> None:
     """Read one file; what is wrong with it is appended to `problems`."""
-    decoder, carriers = Decoder(wire_times.read(args)), Carriers()
+    decoder, carriers = Decoder(wire_times.read(args)), Carriers(choice.read(args))
 
     def take(records: list[Decoded]) -> None:
         for record in records:

@@ -23,6 +23,7 @@ from dalytools.survey.survey import Survey
 from dalytools.survey.wanted import Wanted
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
+from dalytools.wires import choice
 from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from dalyref.options import Options
     from dalytools.survey.difference import Difference
     from dalytools.survey.findings import Finding
+    from dalytools.wires.choice import Choice
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT.html", help="write a page to look at, instead of the listing")
     parser.add_argument("--json", metavar="OUT", help="all of it for programs; - is standard output")
     parser.add_argument("--no-colour", "--no-color", action="store_true", help="as NO_COLOR=1 does")
+    choice.add_arguments(parser)
     wire_times.add_arguments(parser)
 
 
@@ -64,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     wanted = Wanted.read(args)
     problems: list[str] = []
     sets = [[name] for name in files] if args.diff else [files]
-    surveys = [surveyed(some, wire_times.read(args), problems) for some in sets]
+    surveys = [surveyed(some, wire_times.read(args), problems, choice.read(args)) for some in sets]
     for problem in problems:
         print(f"dalyshark survey: {plain(problem)}", file=sys.stderr)  # noqa: T201
     for some, survey in zip(sets, surveys, strict=True):
@@ -113,17 +116,17 @@ def _write(output: str, text: str) -> None:
         out.write(text)
 
 
-def surveyed(files: Sequence[str], options: Options, problems: list[str]) -> Survey:
+def surveyed(files: Sequence[str], options: Options, problems: list[str], wires: Choice | None = None) -> Survey:
     """Survey files behind each other; what is wrong with one is appended to `problems`."""
     survey = Survey()
     for name in files:
-        _read(name, options, survey, problems)
+        _read(name, options, wires, survey, problems)
     survey.finish()
     return survey
 
 
-def _read(name: str, options: Options, survey: Survey, problems: list[str]) -> None:
-    decoder, carriers = Decoder(options), Carriers()
+def _read(name: str, options: Options, wires: Choice | None, survey: Survey, problems: list[str]) -> None:
+    decoder, carriers = Decoder(options), Carriers(wires)
 
     def take(records: list[Decoded]) -> None:
         for record in records:

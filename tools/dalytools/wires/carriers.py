@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Which reader takes a packet, by its link type (docs/wires.md). Bluetooth and TCP have none yet."""
+"""Which reader takes a packet, by its link type (docs/wires.md), and that what they give stays in the file's order."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 from dalyref.packet import SERIAL_LINK_TYPES
 from dalytools.wires import can
+from dalytools.wires.bluetooth import LINK_TYPES as BLUETOOTH
+from dalytools.wires.bluetooth import Bluetooth
+from dalytools.wires.choice import Choice
+from dalytools.wires.network import LINK_TYPES as NETWORK
+from dalytools.wires.tcp import Tcp
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,28 +19,83 @@ if TYPE_CHECKING:
     from dalyref.packet import Packet
 
 SOCKETCAN: Final = 227
+_MOST_BEHIND: Final = 1024
+_MOST_BYTES_BEHIND: Final = 1 << 22
+"""Packets, and bytes of them, that wait until a gap of a TCP connection is closed."""
 
 
 class Carriers:
     """Takes the packets of one capture, in order."""
 
+    def __init__(self, choice: Choice | None = None) -> None:
+        """Raise Problem where a package is missing that the choice needs."""
+        choice = choice or Choice()
+        self._tcp = Tcp(choice.tcp_ports) if choice.tcp_ports else None
+        self._bluetooth = Bluetooth(choice.ble_handles)
+        self._behind: list[Packet] = []
+
+    @property
+    def lost(self) -> bool:
+        """Tell whether bytes of a TCP connection are missing."""
+        return self._tcp is not None and self._tcp.lost
+
+    @property
+    def mixed(self) -> set[str]:
+        """TCP connections with bytes missing and with segments out of order, by name."""
+        return self._tcp.mixed if self._tcp is not None else set()
+
+    @property
+    def connection(self) -> str:
+        """Name the TCP connection of the latest packet; empty: it was no segment of ours."""
+        return self._tcp.latest if self._tcp is not None else ""
+
     def of(self, packet: Packet) -> Sequence[Packet]:
-        """Return what a packet holds for the decoder: nothing where it can't be Daly's."""
+        """Return what has come for the decoder: of this packet, and of those that waited for it; often nothing."""
+        tcp = self._tcp
+        if tcp is not None:
+            tcp.latest = ""
+        if tcp is None or not (tcp.waits or packet.link_type in NETWORK):
+            return self._at_once(packet)
+        given = tcp.feed(packet) if packet.link_type in NETWORK else tcp.pass_time(packet.time_ns)
+        self._behind += given
+        if packet.link_type not in NETWORK:
+            self._behind += self._at_once(packet)
+        if len(self._behind) > _MOST_BEHIND or sum(len(one.data) for one in self._behind) > _MOST_BYTES_BEHIND:
+            self._behind += tcp.give_up()
+        return () if tcp.waits else self._release()
+
+    def finish(self) -> Sequence[Packet]:
+        """Take the end of the capture; return what was held back."""
+        if self._tcp is not None:
+            self._behind += self._tcp.give_up()
+        return self._release()
+
+    def reads(self, link_type: int) -> bool:
+        """Tell whether packets of a link type can hold Daly's bytes."""
+        return (
+            link_type in SERIAL_LINK_TYPES
+            or link_type == SOCKETCAN
+            or link_type in BLUETOOTH
+            or (self._tcp is not None and link_type in NETWORK)
+        )
+
+    def _at_once(self, packet: Packet) -> Sequence[Packet]:
         if packet.link_type in SERIAL_LINK_TYPES:
             return (packet,)
         if packet.link_type == SOCKETCAN:
             return can.frames(packet)
+        if packet.link_type in BLUETOOTH:
+            return self._bluetooth.values(packet)
         return ()
 
-    def finish(self) -> Sequence[Packet]:
-        """Take the end of the capture; return what was held back."""
-        return ()
-
-    @staticmethod
-    def reads(link_type: int) -> bool:
-        """Tell whether packets of a link type can hold Daly's bytes."""
-        return link_type in SERIAL_LINK_TYPES or link_type == SOCKETCAN
+    def _release(self) -> Sequence[Packet]:
+        released = sorted(self._behind, key=lambda packet: packet.number)
+        self._behind = []
+        return released
 
 
-NOT_READ: Final = "what is read is a serial line, as 147 (USER0) to 162 (USER15), and CAN, as SocketCAN"
+NOT_READ: Final = (
+    "what is read is a serial line, as 147 (USER0) to 162 (USER15), CAN, as SocketCAN, Bluetooth, as HCI, and, "
+    "with --tcp-ports, TCP"
+)
 """Said of a file with nothing but other link types."""

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Daly's values in HCI captures; packets written by hand from the Bluetooth papers (docs/wires.md, 3)."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from tests.tools.dalytools.made import ANSWER, ASK, EPOCH_NS, a5
+
+from dalyref.decoder import decode
+from dalyref.packet import Packet
+from dalytools.cli import main
+from dalytools.problem import Problem
+from dalytools.wires.bluetooth import HCI, HCI_WITH_DIRECTION, LINUX_MONITOR
+from dalytools.wires.carriers import Carriers
+from dalytools.wires.choice import Choice, numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dalyref.packet import Direction
+
+SENT, RECEIVED = 0, 1
+WRITE, NOTIFY = 0x0F, 0x11
+HANDLE = 0x40
+
+# Read By Type 2803 from 0001 to FFFF; two characteristics: declared at 000E and 0010, fff2 at 000F, fff1 at 0011
+ASKED, TOLD = "080100ffff0328", "0907" + "0e00040f00f2ff" + "1000101100f1ff"
+LONG = "00001000800000805f9b34fb"
+"""The end of a short UUID's long form: xxxx-0000-1000-8000-00805F9B34FB, high byte first."""
+
+
+def long_form(short: str) -> str:
+    return bytes.fromhex("0000" + short + LONG)[::-1].hex()
+
+
+def data(pdu: str, *, handle: int = HANDLE, first: bool = True, whole: int | None = None) -> bytes:
+    """One HCI data packet, without its kind. whole: length of the L2CAP packet, where more of it follows."""
+    body = bytes.fromhex(pdu)
+    if first:
+        body = struct.pack("<HH", len(body) if whole is None else whole, 4) + body
+    return struct.pack("<HH", handle | (0x2000 if first else 0x1000), len(body)) + body
+
+
+def connected(handle: int = HANDLE, *, enhanced: bool = False, status: int = 0) -> bytes:
+    """LE (Enhanced) Connection Complete, without its kind: subevent, status, handle, and the rest as zeros."""
+    rest = bytes(27 if enhanced else 15)
+    inner = struct.pack("<BBH", 0x0A if enhanced else 0x01, status, handle) + rest
+    return bytes((0x3E, len(inner))) + inner
+
+
+class Air:
+    """A capture in the making."""
+
+    def __init__(self, link_type: int = HCI_WITH_DIRECTION) -> None:
+        self.link_type = link_type
+        self.packets: list[Packet] = []
+
+    def put(self, received: int, body: bytes, *, event: bool = False, adapter: int = 0, at_ms: float = 0) -> None:
+        kind = 4 if event else 2
+        direction: Direction = ""
+        if self.link_type == LINUX_MONITOR:
+            whole = struct.pack(">HH", adapter, 3 if event else 4 + received) + body
+        elif self.link_type == HCI_WITH_DIRECTION:
+            whole = struct.pack(">IB", received, kind) + body
+        else:
+            whole, direction = bytes((kind,)) + body, "inbound" if received else "outbound"
+        number = len(self.packets) + 1
+        time_ns = EPOCH_NS + round((at_ms or 10 * number) * 1e6)
+        self.packets.append(
+            Packet(number=number, time_ns=time_ns, data=whole, direction=direction, link_type=self.link_type)
+        )
+
+    def discover(self, told: str = TOLD, **where: int) -> None:
+        self.put(SENT, data(ASKED), **where)
+        self.put(RECEIVED, data(told), **where)
+
+    def speak(self, **where: int) -> None:
+        self.put(SENT, data("520f00" + ASK.hex()), **where)
+        self.put(RECEIVED, data("1b1100" + ANSWER.hex()), **where)
+
+    def values(self, handles: str = "") -> list[tuple[int, str, bytes]]:
+        carriers = Carriers(Choice(ble_handles=numbers(handles)) if handles else None)
+        return [(one.number, one.direction, one.data) for each in self.packets for one in carriers.of(each)]
+
+
+@pytest.mark.parametrize("link_type", [HCI, HCI_WITH_DIRECTION, LINUX_MONITOR])
+@pytest.mark.parametrize(
+    "told",
+    [
+        TOLD,
+        "0907" + "0e00040f0002ff" + "1000101100 01ff",
+        "0915" + "0e00040f00" + long_form("fff2") + "1000101100" + long_form("fff1"),
+        "0501" + "0f00f2ff" + "1100f1ff",
+        "0502" + "0f00" + long_form("fff2") + "1100" + long_form("fff1"),
+    ],
+    ids=["fff1 and fff2", "ff01 and ff02", "long form", "find information", "find information, long form"],
+)
+def test_attributes_are_known_by_discovery(link_type: int, told: str) -> None:
+    air = Air(link_type)
+    air.put(RECEIVED, connected(), event=True)
+    air.discover(told)
+    air.speak()
+    assert air.values() == [(4, "outbound", ASK), (5, "inbound", ANSWER)]
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        "0907" + "0e00040f00192a" + "1000101100002a",  # other characteristics
+        "0915" + "0e00040f00" + "f2ff" + "11" * 14 + "1000101100" + "f1ff" + "22" * 14,  # UUIDs of somebody's own
+    ],
+)
+def test_other_devices_are_left_alone(told: str) -> None:
+    air = Air()
+    air.speak()
+    air.discover(told)
+    air.speak()
+    assert air.values() == []
+
+
+def test_only_answers_about_characteristics_tell() -> None:
+    air = Air()
+    air.put(SENT, data("080100ffff002a"))  # reads device names
+    air.put(RECEIVED, data(TOLD))
+    air.speak()
+    assert air.values() == []
+
+
+def test_attributes_are_known_by_their_handles() -> None:
+    air = Air()
+    air.speak()
+    air.put(SENT, data("120f00" + ASK.hex()))  # a write with answer
+    air.put(RECEIVED, data("1d1100" + ANSWER.hex()))  # an indication
+    air.put(RECEIVED, data("1b1200" + ANSWER.hex()))
+    assert [number for number, _, _ in air.values("0x0f,17")] == [1, 2, 3, 4]
+    assert [number for number, _, _ in air.values("17")] == [2, 4]
+
+
+@pytest.mark.parametrize("enhanced", [False, True])
+def test_a_new_connection_forgets(enhanced: bool) -> None:
+    air = Air()
+    air.discover()
+    air.put(RECEIVED, connected(0x41, enhanced=enhanced), event=True)
+    air.put(RECEIVED, connected(enhanced=enhanced, status=0x3E), event=True)  # failed
+    air.speak()
+    air.put(RECEIVED, connected(enhanced=enhanced), event=True)
+    air.speak()
+    assert [number for number, _, _ in air.values()] == [5, 6]
+
+
+def test_adapters_are_apart() -> None:
+    air = Air(LINUX_MONITOR)
+    air.discover(adapter=1)
+    air.speak(adapter=0)
+    air.speak(adapter=1)
+    assert [number for number, _, _ in air.values()] == [5, 6]
+
+
+def test_data_packets_are_put_together() -> None:
+    air = Air()
+    pdu = "1b1100" + ANSWER.hex()
+    air.put(RECEIVED, data(pdu[:10], whole=16))
+    air.put(SENT, data("520f00" + ASK.hex()))
+    air.put(RECEIVED, data(pdu[10:20], first=False))
+    air.put(RECEIVED, data(pdu[20:], first=False))
+    air.put(RECEIVED, data(pdu[20:], first=False))  # nothing was begun
+    air.put(RECEIVED, data(pdu[:10], whole=16))
+    air.put(RECEIVED, data(pdu))  # begins anew
+    assert air.values("15,17") == [(2, "outbound", ASK), (4, "inbound", ANSWER), (7, "inbound", ANSWER)]
+
+
+def test_a_frame_over_several_notifications_and_several_in_one() -> None:
+    air = Air()
+    air.discover()
+    cells = a5(1, 0x95, bytes.fromhex("010ce40ce50ce6")) + a5(1, 0x95, bytes.fromhex("020ce70ce80ce9"))
+    counts = a5(1, 0x94, b"\x06\x02")
+    stream = counts + cells
+    air.put(SENT, data("520f00" + (a5(0x40, 0x94) + a5(0x40, 0x95)).hex()), at_ms=100)
+    air.put(RECEIVED, data("1b1100" + stream[:20].hex()), at_ms=150)
+    air.put(RECEIVED, data("1b1100" + stream[20:].hex()), at_ms=2000)  # silence divides nothing
+    carriers = Carriers()
+    records = list(decode(one for each in air.packets for one in carriers.of(each)))
+    assert [(record.number, record.kind.value) for record in records] == [
+        (number, "frame") for number in (3, 3, 4, 5, 5)
+    ]
+    assert records[2].fields["daly.response_time"] == pytest.approx(0.05)
+    assert records[4].fields["daly.cells.voltage"] == [3300, 3301, 3302, 3303, 3304, 3305]
+    assert {record.fields["daly.transport"] for record in records} == {"ble"}
+
+
+def test_the_modules_own_text_is_named() -> None:
+    air = Air()
+    air.discover()
+    air.put(SENT, data("520f00" + b"AT+VER=?\r\n".hex()))
+    air.put(RECEIVED, data("1b1100" + b"+VER:1.0\r\n".hex()))
+    carriers = Carriers()
+    records = list(decode(one for each in air.packets for one in carriers.of(each)))
+    assert [record.fields["daly.foreign"] for record in records] == ["Bluetooth module"] * 2
+
+
+def test_cut_off_and_damaged_packets_are_no_error() -> None:
+    air = Air()
+    air.put(RECEIVED, connected(), event=True)
+    air.discover()
+    air.speak()
+    whole: Sequence[Packet] = air.packets
+    for each in whole:
+        for cut in range(len(each.data)):
+            for flipped in (0x00, 0xFF):
+                piece = each.data[:cut] + bytes((flipped,)) + each.data[cut + 1 :]
+                carriers = Carriers()
+                for one in (*whole, Packet(number=9, time_ns=0, data=piece, link_type=each.link_type), *whole):
+                    carriers.of(one)
+                carriers.of(Packet(number=9, time_ns=0, data=each.data[:cut], link_type=each.link_type))
+
+
+def test_without_scapy_it_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "scapy.layers.bluetooth", None)
+    monkeypatch.setitem(sys.modules, "scapy.layers", None)
+    air = Air()
+    air.discover()
+    with pytest.raises(Problem, match=r"pip install 'dalyshark\[scapy\]'"):
+        air.values()
+
+
+def test_the_simulators_capture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "ble.pcapng")
+    assert main(["simulate", "clean-ble", "-w", path, "--duration", "5"]) == 0
+    capsys.readouterr()
+    assert main(["decode", path]) == 0
+    shown = capsys.readouterr().out
+    assert "= 16 cells" in shown
+    assert "unanswered" not in shown
+    assert main(["check", "--no-dissector", path]) == 0

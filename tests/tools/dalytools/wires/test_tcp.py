@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""TCP segments in order, whatever order they come in; packets are built by scapy (docs/wires.md, 4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from scapy.layers.inet import IP, TCP, fragment
+from scapy.layers.inet6 import IPv6, IPv6ExtHdrDestOpt
+from scapy.layers.l2 import CookedLinux, CookedLinuxV2, Dot1Q, Ether, Loopback
+from scapy.packet import Packet as Layers
+from scapy.packet import Raw
+from tests.tools.dalytools.made import ANSWER, ASK, EPOCH_NS, a5
+
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
+from dalyref.packet import Packet
+from dalytools.cli import main
+from dalytools.comparison import compare
+from dalytools.tshark import Tshark
+from dalytools.wires.carriers import Carriers
+from dalytools.wires.choice import Choice, numbers
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+CHOICE = Choice(tcp_ports=numbers("8899"))
+ETHERNET, RAW_IP, USER0 = 1, 101, 147
+CLIENT, SERVER = 0, 1
+
+Handed = tuple[int, bytes, bool]
+"""Number of the packet it counts to, bytes, whether bytes before it are lost."""
+
+
+def tcp(side: int, sequence: int, data: bytes, flags: str = "PA") -> Layers:
+    ports = (50000, 8899) if side == CLIENT else (8899, 50000)
+    return TCP(sport=ports[0], dport=ports[1], seq=sequence & 0xFFFFFFFF, flags=flags) / Raw(data)
+
+
+def ip(side: int, sequence: int, data: bytes, flags: str = "PA") -> bytes:
+    ends = ("192.0.2.10", "192.0.2.20") if side == CLIENT else ("192.0.2.20", "192.0.2.10")
+    return bytes(IP(src=ends[0], dst=ends[1]) / tcp(side, sequence, data, flags))
+
+
+def packet(number: int, data: bytes, *, ms: float | None = None, link_type: int = RAW_IP) -> Packet:
+    at = EPOCH_NS + round((10 * number if ms is None else ms) * 1e6)
+    return Packet(number=number, time_ns=at, data=data, link_type=link_type)
+
+
+def handed(packets: Sequence[Packet]) -> list[Handed]:
+    carriers = Carriers(CHOICE)
+    given = [one for each in packets for one in carriers.of(each)]
+    return [(one.number, one.data, one.after_gap) for one in (*given, *carriers.finish())]
+
+
+def of(*segments: tuple[int, bytes]) -> list[Packet]:
+    return [packet(number, ip(SERVER, *segment)) for number, segment in enumerate(segments, 1)]
+
+
+@pytest.mark.parametrize("start", [1000, (1 << 32) - 7], ids=["plain", "sequence numbers begin anew"])
+def test_what_comes_late_is_put_in_order_and_what_comes_again_is_dropped(start: int) -> None:
+    found = handed(
+        of((start, b"abcd"), (start + 8, b"ijkl"), (start + 12, b"mnop"), (start + 8, b"ijkl"), (start + 4, b"efgh"))
+    )
+    assert found == [(1, b"abcd", False), (5, b"efghijklmnop", False)]
+    assert handed(of((start, b"abcd"), (start, b"abcd"), (start + 2, b"cdef"))) == [
+        (1, b"abcd", False),
+        (3, b"ef", False),
+    ]
+    assert handed(of((start, b"abcd"), (start + 3, b"x"), (start + 4, b"e")))[-1] == (3, b"e", False)  # keep-alive
+
+
+def test_a_gap_that_stays_divides() -> None:
+    assert handed(of((1000, b"abcd"), (1008, b"ijkl"), (1012, b"m"))) == [
+        (1, b"abcd", False),
+        (2, b"ijkl", True),
+        (3, b"m", False),
+    ]
+    late = [*of((1000, b"abcd"), (1008, b"ijkl")), packet(3, ip(SERVER, 1004, b"efgh"), ms=1021)]
+    assert handed(late) == [(1, b"abcd", False), (2, b"ijkl", True)]  # more than a second after the one at 20 ms
+    in_time = [*late[:2], packet(3, ip(SERVER, 1004, b"efgh"), ms=1020)]
+    assert handed(in_time) == [(1, b"abcd", False), (3, b"efghijkl", False)]
+
+
+def test_what_waits_behind_a_gap_is_bounded() -> None:
+    carriers = Carriers(CHOICE)
+    carriers.of(packet(1, ip(SERVER, 1000, b"a")))
+    sizes = [
+        sum(len(one.data) for one in carriers.of(packet(number, ip(SERVER, 2000 + 1000 * number, bytes(1000)), ms=5)))
+        for number in range(2, 69)
+    ]
+    assert sizes == [0] * 65 + [66_000, 1000]  # 64 KiB is less than 66 segments of 1000
+
+
+def test_bytes_that_the_snap_length_cut_off_are_lost() -> None:
+    whole = ip(SERVER, 1004, b"efgh")
+    packets = [packet(1, ip(SERVER, 1000, b"abcd")), packet(2, whole[:-2]), packet(3, ip(SERVER, 1008, b"ijkl"))]
+    assert handed(packets) == [(1, b"abcd", False), (2, b"ef", False), (3, b"ijkl", True)]
+
+
+def test_a_syn_with_another_number_begins_a_connection() -> None:
+    carriers = Carriers(CHOICE)
+    segments = [
+        (CLIENT, 99, b"", "S"),
+        (SERVER, 499, b"", "SA"),
+        (CLIENT, 100, b"ask", "PA"),
+        (CLIENT, 99, b"", "S"),  # sent again
+        (SERVER, 500, b"answer", "PA"),
+        (CLIENT, 7777, b"", "S"),
+        (SERVER, 12, b"", "SA"),
+        (SERVER, 13, b"new", "PA"),
+        (CLIENT, 7778, b"", "R"),
+    ]
+    given = [one for number, segment in enumerate(segments, 1) for one in carriers.of(packet(number, ip(*segment)))]
+    assert [(one.data, one.connection, one.direction) for one in given] == [
+        (b"ask", "tcp 1", "outbound"),
+        (b"answer", "tcp 1", "inbound"),
+        (b"new", "tcp 2", "inbound"),
+    ]
+
+
+SEGMENT = tcp(SERVER, 1, ASK)
+V4, V6 = IP(src="192.0.2.20", dst="192.0.2.10"), IPv6(src="2001:db8::20", dst="2001:db8::10")
+CARRIED: dict[str, tuple[int, Layers]] = {
+    "Ethernet": (1, Ether() / V4 / SEGMENT),
+    "Ethernet, padded": (1, Ether() / V4 / SEGMENT / Raw(b"")),
+    "VLAN": (1, Ether() / Dot1Q(vlan=5) / V4 / SEGMENT),
+    "IPv6": (1, Ether() / V6 / SEGMENT),
+    "IPv6 with options": (1, Ether() / V6 / IPv6ExtHdrDestOpt() / SEGMENT),
+    "raw IP": (101, V4 / SEGMENT),
+    "raw IPv6": (101, V6 / SEGMENT),
+    "loopback": (0, Loopback(type=2) / V4 / SEGMENT),
+    "cooked": (113, CookedLinux(proto=0x800) / V4 / SEGMENT),
+    "cooked 2": (276, CookedLinuxV2(proto=0x800) / V4 / SEGMENT),
+}
+
+
+@pytest.mark.parametrize("way", CARRIED)
+def test_the_layers_below(way: str) -> None:
+    link_type, layers = CARRIED[way]
+    data = bytes(layers) + (bytes(6) if "padded" in way else b"")
+    assert handed([packet(1, data, link_type=link_type)]) == [(1, ASK, False)]
+    for cut in range(0, len(data), 3):  # cut off anywhere: less, never an error
+        handed([packet(1, data[:cut], link_type=link_type)])
+
+
+def test_other_traffic_is_left_alone() -> None:
+    other = bytes(V4 / TCP(sport=8898, dport=50000, flags="PA") / Raw(ASK + (8899).to_bytes(2, "big")))
+    pieces = [bytes(piece) for piece in fragment(V4 / tcp(SERVER, 1, bytes(64)), 40)]
+    assert len(pieces) == 3
+    assert handed([packet(number, data) for number, data in enumerate([other, *pieces, b""], 1)]) == []
+    assert Carriers().reads(RAW_IP) is False
+    assert Carriers().of(packet(1, ip(SERVER, 1, ASK))) == ()
+
+
+def test_the_order_of_the_file_is_kept() -> None:
+    """A serial packet that comes while a gap is open waits for it too."""
+    packets = [
+        packet(1, ip(SERVER, 1000, b"abcd")),
+        packet(2, ip(SERVER, 1008, b"ijkl")),
+        packet(3, b"serial", link_type=USER0),
+        packet(4, ip(CLIENT, 50, b"ask")),
+        packet(5, ip(SERVER, 1004, b"efgh")),
+        packet(6, b"more", link_type=USER0),
+    ]
+    assert [number for number, _, _ in handed(packets)] == [1, 3, 4, 5, 6]
+    assert [number for number, _, _ in handed(packets[:4])] == [1, 2, 3, 4]
+    waits = [*packets[:2], packet(3, b"serial", ms=2000, link_type=USER0), packet(4, b"x", ms=2001, link_type=USER0)]
+    carriers = Carriers(CHOICE)
+    assert [[one.number for one in carriers.of(each)] for each in waits] == [[1], [], [2, 3], [4]]
+
+
+def save(path: Path, segments: Sequence[bytes]) -> Path:
+    with open_writer(path, application="test") as writer:
+        writer.add_interface(Interface("eth0", "", RAW_IP))
+        for number, data in enumerate(segments, 1):
+            writer.write_packet(EPOCH_NS + number * 10_000_000, data)
+    path.chmod(0o644)
+    return path
+
+
+CELLS = [a5(1, 0x95, bytes((n, 0x0C, 0xE0 + n, 0x0C, 0xE4, 0x0C, 0xE8))) for n in range(1, 6)]
+STREAM = ANSWER + b"".join(CELLS)
+CUTS = {
+    "in order": [(0, 13), (13, 30), (30, 78)],
+    "late": [(0, 13), (30, 50), (13, 30), (50, 78)],
+    "sent again": [(0, 13), (13, 30), (13, 30), (0, 13), (30, 78)],
+    "again with more": [(0, 13), (13, 20), (13, 40), (40, 78)],
+    "lost": [(0, 13), (13, 30), (40, 60), (60, 78)],
+    "incomplete at the end": [(0, 13), (13, 30)],
+    "a damaged one, and the beginning of one behind it": [(0, 13), (13, 26), (100, 114), (114, 126)],
+}
+
+
+@pytest.mark.parametrize("way", CUTS)
+def test_both_readings_agree(way: str, tmp_path: Path) -> None:
+    bad = bytearray(CELLS[0])
+    bad[12] ^= 1
+    stream = STREAM + bytes(22) + bytes(bad) + CELLS[1]  # the bad frame is 100 to 112
+    segments = [ip(CLIENT, 7, ASK)]
+    shift = 74 if way.startswith("a damaged") else 0
+    segments += [ip(SERVER, 1000 + (a - shift if a >= 100 else a), stream[a:b]) for a, b in CUTS[way]]
+    path = save(tmp_path / "tcp.pcapng", segments)
+    with Tshark() as tshark:
+        found = compare(tshark, path, wires=CHOICE)
+    assert (found.differences, found.left_out, found.broken) == ([], 0, "")
+    frames = {"lost": 5, "incomplete at the end": 3}.get(way, 4 if shift else 7)
+    assert found.kinds.get("frame") == frames
+    assert found.kinds.get("bad_checksum", 0) == (1 if shift else 0)
+
+
+def test_a_connection_with_late_and_lost_segments_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cuts = [(0, 13), (26, 39), (13, 26), (45, 78)]
+    path = save(tmp_path / "tcp.pcapng", [ip(SERVER, 1000 + a, STREAM[a:b]) for a, b in cuts])
+    assert main(["check", "--no-rules", "--tcp-ports", "8899", str(path)]) == 0
+    assert "1 TCP connection with lost and late segments not compared" in capsys.readouterr().err
+    assert main(["check", "--no-dissector", "--tcp-ports", "8880-8899", str(path)]) == 0
+    assert main(["check", str(path)]) == 2
+    assert "with --tcp-ports, TCP" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ports", ["", "0", "65536", "8899,", "9-8", "eighty"])
+def test_ports_that_are_none(ports: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["decode", "x.pcapng", "--tcp-ports", ports])
+    assert "is no list of numbers from 1 to 65535" in capsys.readouterr().err
+
+
+def test_ports_and_handles() -> None:
+    assert str(numbers("8899")) == "8899"
+    assert str(numbers("4001, 0x10-0x1F")) == "4001,16-31"
+    assert 31 in numbers("0x10-0x1f")
+    assert 32 not in numbers("0x10-0x1f")

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Bluetooth: the values of Daly's attributes in HCI captures (link types 187, 201, 254), over scapy's ATT and events.
+
+    187   packet                                   packet: kind u8, 02 data, 04 event; H4 of the Bluetooth papers
+    201   direction u32, high byte first | packet
+    254   adapter u16, opcode u16, high byte first | packet without its kind
+
+    data  02 | connection (12 bits), PB flags | length u16 | L2CAP: length u16, channel u16 | ATT ...
+
+Low byte first, but where said. ATT packets over several data packets are put together. Which attributes are Daly's:
+docs/wires.md, 3.
+"""
+
+# scapy's fields have no types that a checker could follow.
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+from dalyref.packet import Packet
+from dalytools.problem import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dalyref.packet import Direction
+    from dalytools.wires.choice import Numbers
+
+HCI, HCI_WITH_DIRECTION, LINUX_MONITOR = 187, 201, 254
+LINK_TYPES: Final = frozenset((HCI, HCI_WITH_DIRECTION, LINUX_MONITOR))
+
+_DATA, _EVENT = 2, 4
+_MONITOR_KINDS: Final = {3: (_EVENT, 1), 4: (_DATA, 0), 5: (_DATA, 1)}
+"""What an opcode of the monitor carries, and whether it was received."""
+
+_NOT_TOLD: Final = -1
+"""Of an HCI packet whose direction the file does not tell."""
+
+_ATT_CHANNEL: Final = 4
+_CONNECTION_COMPLETE, _LE_META = b"\x03", b"\x3e"
+_CONNECTED: Final = (b"\x01", b"\x0a")  # of LE, the plain one and the enhanced one
+_COMPLETE: Final = (
+    "HCI_Event_Connection_Complete",
+    "HCI_LE_Meta_Connection_Complete",
+    "HCI_LE_Meta_Enhanced_Connection_Complete",
+)
+_FIND_INFORMATION_RESPONSE, _READ_BY_TYPE, _READ_BY_TYPE_RESPONSE = 0x05, 0x08, 0x09
+_WRITES: Final = frozenset((0x12, 0x52))
+_NOTICES: Final = frozenset((0x1B, 0x1D))
+_CHARACTERISTIC: Final = 0x2803
+_DALYS: Final = frozenset((0xFFF1, 0xFFF2, 0xFF01, 0xFF02))
+_BASE: Final = 0x00000000_0000_1000_8000_00805F9B34FB
+"""A short UUID in its long form is this, and the short one x 2^96."""
+
+_MOST_CONNECTIONS: Final = 256
+_MOST_HANDLES: Final = 256  # of Daly's, in one connection
+
+
+@dataclass(slots=True)
+class _Begun:
+    """An L2CAP packet of which more is to come."""
+
+    data: bytes = b""
+    length: int = 0
+
+
+@dataclass(slots=True)
+class _Connection:
+    """One connection handle, from a Connection Complete event to the next."""
+
+    name: str
+    handles: set[int] = field(default_factory=set[int])
+    """Of Daly's attributes."""
+    asks_characteristics: bool = False
+    """The newest Read By Type request is for 2803."""
+    begun: dict[int, _Begun] = field(default_factory=dict[int, _Begun])  # by direction
+    lost: set[Direction] = field(default_factory=set["Direction"])
+    """Sides of Daly's attributes that a packet is missing of."""
+
+
+class Bluetooth:
+    """Takes the HCI packets of a capture, in order."""
+
+    def __init__(self, handles: Numbers) -> None:
+        self._handles = handles
+        self._connections: dict[tuple[int, int, int], _Connection] = {}  # by interface, adapter, connection handle
+        self._names = 0
+        self._scapy: Any = None
+
+    def values(self, packet: Packet) -> Sequence[Packet]:
+        """Return the value of Daly's that a packet holds or completes; most hold none."""
+        data, adapter, received = packet.data, 0, 0
+        if packet.link_type == LINUX_MONITOR:
+            if len(data) < 4:
+                return ()
+            adapter, opcode = struct.unpack_from(">HH", data)
+            kind, received = _MONITOR_KINDS.get(opcode, (0, 0))
+            data = data[4:]
+        else:
+            if packet.link_type == HCI_WITH_DIRECTION:
+                received = int.from_bytes(data[:4], "big") & 1
+                data = data[4:]
+            else:
+                received = {"outbound": 0, "inbound": 1}.get(packet.direction, _NOT_TOLD)
+            kind, data = (data[0], data[1:]) if data else (0, b"")
+        if kind == _EVENT:
+            self._event(packet.interface, adapter, data)
+        elif kind == _DATA:
+            return self._data(packet, adapter, received, data)
+        return ()
+
+    def _event(self, interface: int, adapter: int, data: bytes) -> None:
+        """Begin a connection anew where an event says so."""
+        if not (data[:1] == _CONNECTION_COMPLETE or (data[:1] == _LE_META and data[2:3] in _CONNECTED)):
+            return
+        event = self._layers().HCI_Event_Hdr(data)
+        for name in _COMPLETE:
+            complete = event.getlayer(name)
+            if complete is not None and complete.status == 0 and len(data) > 5:
+                self._connections.pop((interface, adapter, complete.connection_handle & 0xFFF), None)
+
+    def _data(self, packet: Packet, adapter: int, received: int, data: bytes) -> Sequence[Packet]:
+        """Put an L2CAP packet together; read it when it is whole."""
+        if len(data) < 4:
+            return ()
+        word, length = struct.unpack_from("<HH", data)
+        data = data[4 : 4 + length]
+        connection = self._connection(packet.interface, adapter, word & 0xFFF)
+        begun = connection.begun.pop(received, None)
+        if word >> 12 & 3 == 1:
+            if begun is None:
+                return ()
+            begun.data += data
+        else:
+            if begun is not None:
+                self._lose(connection, begun)
+            begun = _Begun(data, 4 + int.from_bytes(data[:2], "little"))
+        if len(data) < length or len(begun.data) > begun.length:  # cut off by the snap length, or not a part of it
+            self._lose(connection, begun)
+        elif len(begun.data) < begun.length:
+            connection.begun[received] = begun
+        elif int.from_bytes(begun.data[2:4], "little") == _ATT_CHANNEL:
+            return self._att(packet, connection, received, begun.data[4:])
+        return ()
+
+    def _lose(self, connection: _Connection, begun: _Begun) -> None:
+        """Note that a packet stays incomplete: where it is one of Daly's, bytes are missing."""
+        if int.from_bytes(begun.data[2:4], "little") == _ATT_CHANNEL:
+            direction = self._side(connection, begun.data[4:])
+            if direction:
+                connection.lost.add(direction)
+
+    def _side(self, connection: _Connection, pdu: bytes) -> Direction:
+        """Return which side's value an ATT packet holds, where it is an attribute of Daly's; else nothing."""
+        opcode, handle = pdu[0] if pdu else 0, int.from_bytes(pdu[1:3], "little")
+        if len(pdu) < 3 or not (handle in connection.handles or handle in self._handles):
+            return ""
+        return "outbound" if opcode in _WRITES else "inbound" if opcode in _NOTICES else ""
+
+    def _connection(self, interface: int, adapter: int, handle: int) -> _Connection:
+        key = (interface, adapter, handle)
+        connection = self._connections.get(key)
+        if connection is None:
+            if len(self._connections) >= _MOST_CONNECTIONS:
+                del self._connections[next(iter(self._connections))]
+            self._names += 1
+            connection = self._connections[key] = _Connection(f"ble {self._names}")
+        return connection
+
+    def _att(self, packet: Packet, connection: _Connection, received: int, pdu: bytes) -> Sequence[Packet]:
+        opcode = pdu[0] if pdu else 0
+        direction = self._side(connection, pdu)
+        if direction:
+            return (self._value(packet, connection, pdu[3:], direction),) if len(pdu) > 3 else ()
+        if opcode == _READ_BY_TYPE and received != 1:
+            connection.asks_characteristics = pdu[5:] == _CHARACTERISTIC.to_bytes(2, "little")
+        elif received == 0:
+            pass  # replies of this host, which is asked by somebody
+        elif opcode == _READ_BY_TYPE_RESPONSE and connection.asks_characteristics:
+            response = self._layers().ATT_Hdr(pdu)
+            for one in getattr(response.payload, "handles", ()):
+                value: bytes = one.value  # properties, handle of the value, UUID
+                self._found(connection, int.from_bytes(value[1:3], "little"), int.from_bytes(value[3:], "little"))
+        elif opcode == _FIND_INFORMATION_RESPONSE:
+            response = self._layers().ATT_Hdr(pdu)
+            for one in getattr(response.payload, "handles", ()):
+                self._found(connection, one.handle, int(one.value))
+        return ()
+
+    @staticmethod
+    def _found(connection: _Connection, handle: int, uuid: int) -> None:
+        """Note whose attribute a handle is; a later discovery is right."""
+        if uuid in _DALYS or ((uuid - _BASE) >> 96 in _DALYS and uuid & (1 << 96) - 1 == _BASE):
+            if len(connection.handles) < _MOST_HANDLES:
+                connection.handles.add(handle)
+        else:
+            connection.handles.discard(handle)
+
+    @staticmethod
+    def _value(packet: Packet, connection: _Connection, value: bytes, direction: Direction) -> Packet:
+        after_gap = direction in connection.lost
+        connection.lost.discard(direction)
+        return Packet(
+            number=packet.number,
+            time_ns=packet.time_ns,
+            data=value,
+            interface=packet.interface,
+            direction=direction,
+            comment=packet.comment,
+            link_type=packet.link_type,
+            transport="ble",
+            connection=connection.name,
+            after_gap=after_gap,
+        )
+
+    def _layers(self) -> Any:
+        if self._scapy is None:
+            try:
+                from scapy.layers import bluetooth
+            except ImportError:
+                raise Problem(
+                    "Bluetooth is read with the package scapy: type  pip install 'dalyshark[scapy]'"
+                ) from None
+            self._scapy = bluetooth
+        return self._scapy
