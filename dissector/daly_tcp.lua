@@ -66,7 +66,7 @@ local function cut(raw)
   return found, #cutter.buf
 end
 
--- When each byte came: a list of { at = position, time }. What a packet left undecided is handed to us again, in front of
+-- When each byte came: a list of { at = position, time }. What a packet left undecided is handed to us again, before
 -- the next bytes of its direction, as if it were theirs; unless bytes between were lost.
 local function begins(bus, side, raw, left, time)
   local sides = held[bus] or {}

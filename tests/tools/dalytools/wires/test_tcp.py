@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """TCP segments in order, whatever order they come in; packets are built by scapy (docs/wires.md, 4)."""
 
+# scapy's functions have no types.
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
