@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -74,16 +75,16 @@ class DataSet:
         self._keys = keys
         self._columns = [column for column in columns if column.name not in keys]
         self._check_present()
-        self._beside = self._place.with_name(f".{self._place.name}.{os.getpid()}.part")
+        try:
+            beside = tempfile.mkdtemp(prefix=f".{self._place.name}.", suffix=".part", dir=self._place.parent)
+        except OSError as error:
+            raise Problem(f"{place}: cannot be written: {error.strerror}; name another directory with -o") from None
+        self._beside = Path(beside)
         self._open: dict[_Place, _Part] = {}  # the one used longest ago first
         self._input = _Input()
         self._done: list[tuple[str, _Input]] = []
         self._files = 0
         self._loose = 0
-        try:
-            self._beside.mkdir()
-        except OSError as error:
-            raise Problem(f"{place}: cannot be written: {error.strerror}; name another directory with -o") from None
 
     def put(self, row: Row) -> None:
         """Take a row."""
@@ -122,9 +123,12 @@ class DataSet:
                     name = f"{fingerprint}-{number}{_SUFFIX}"
                     path.replace(folder / name)
                     kept.add(Path(*place, name))
-        if not self._place.exists():
-            tree.rename(self._place)
-        else:
+        try:
+            tree.rename(self._place)  # in one go, where nothing is there yet
+        except OSError:
+            if not self._place.is_dir():
+                raise
+            self._check_present()  # somebody else may have made it meanwhile
             for path in sorted(kept):
                 there = self._place / path
                 there.parent.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,11 @@ import pytest
 from tests.tools.dalytools.exports.sessions import ask_and_answer, decode, poll
 from tests.tools.dalytools.made import ANSWER, ASK, write
 
+from dalyref.decoder import decode as decode_records
+from dalyref.packet import Packet
 from dalytools.exports import data_set
 from dalytools.exports.data_set import DataSet
+from dalytools.exports.records import Records
 
 DAY = 86_400
 WORDS = ("--format", "parquet", "--partition", "board,day")
@@ -190,6 +194,27 @@ def test_a_capture_that_makes_fewer_files_now_leaves_no_old_ones(
     assert decode(capture, *WORDS, "-o", place) == 0
     assert len(files(place)) == 2
     assert sum(count(place).values()) == 12
+
+
+def test_two_that_begin_a_data_set_at_once(tmp_path: Path) -> None:
+    place = tmp_path / "fleet"
+    both = [DataSet(str(place), ["board"], Records().columns) for _ in range(2)]
+    for number, mine in enumerate(both):
+        for record in decode_records([Packet(1, number * 10**9, ASK)]):
+            for row in Records().take("a", record):
+                mine.put(row)
+        mine.end_file(f"{number}")
+    for mine in both:
+        mine.commit()
+    assert files(place) == ["board=1/0-0.parquet", "board=1/1-0.parquet"]
+    assert list(tmp_path.iterdir()) == [place]
+    assert place.stat().st_mode & 0o777 == 0o777 & ~umask()
+
+
+def umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def test_memory_is_bounded_over_many_partitions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
