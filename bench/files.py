@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from bench.options import Options
-    from dalytools.simulator.bus import Sent
+    from dalytools.simulator.sent import Sent
 
 PACKETS = 50_000
 OURS, SCAPY, PYTHON_PCAPNG, FLOOR = "ours", "scapy", "python-pcapng", "os.write alone"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from dalytools.simulator.bus import Sent
+    from dalytools.simulator.sent import Sent
 
 EPOCH_NS = 1_700_000_000_000_000_000
 

@@ -25,8 +25,9 @@ from dalycapture.output import open_output
 from dalycapture.pcap import PcapWriter
 from dalycapture.pcapng import CRC_ERROR, TOO_SHORT, PcapngWriter
 from dalyref.records import Kind, Splitter
-from dalytools.simulator.bus import Bus, Sent
+from dalytools.simulator.bus import Bus
 from dalytools.simulator.scenario import Board, Event, Habits, Host, Pack, Scenario
+from dalytools.simulator.sent import Sent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -19,22 +19,15 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Final, NoReturn
 
+from dalycapture.extcap_names import FILTERS, HEARD, INTERFACE, LOG, MARK, MARK_TEXT
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from dalycapture.adapters import Adapter
 
-INTERFACE: Final = "daly"  # any adapter, chosen by its option "port"
 DISPLAY: Final = "Daly BMS"
 VERSION: Final = "1.0"  # of this tool's side of the conversation
-
-LOG, MARK_TEXT, MARK, HEARD = range(4)
-"""Numbers of the controls in the toolbar."""
-
-FILTERS: Final = (
-    "A serial line has no capture filter: every byte is kept. Leave it empty, and use a display filter, such as "
-    "daly.data_id == 0x90"
-)
 
 _CONTROLS: Final = (
     (HEARD, "string", "Heard", "Records so far; bad: damaged frames; boards that answered"),

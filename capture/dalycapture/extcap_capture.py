@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 from dalycapture.adapters import serial_ports
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError
-from dalycapture.extcap import FILTERS, INTERFACE
+from dalycapture.extcap_names import FILTERS, INTERFACE
 from dalycapture.interface import bus_name, tap_of
 from dalycapture.opening import open_port
 from dalycapture.output import PipeOutput

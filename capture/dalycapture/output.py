@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Protocol
 from dalycapture.checksum import checksum_path, write_checksum
 from dalycapture.disk import DiskThread
 from dalycapture.errors import CaptureError, reason
+from dalycapture.torn import find_end
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -306,8 +307,6 @@ def open_file(
 
 def _whole(fd: int, name: str, file_format: str, hasher: Hasher | None) -> Whole | None:
     """Find what is whole of the capture that is there, and begin its checksum; None: there is nothing."""
-    from dalycapture.torn import find_end
-
     size = os.fstat(fd).st_size
     if not size:
         return None

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 from dalycapture.captured import CapturedPacket, Told
 from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.file_numbers import MAX_PACKET, MICROSECONDS, NANOSECONDS
 from dalycapture.interface import Interface
 from dalycapture.linktype import link_type_name
 from dalycapture.writer import CaptureWriter, counted
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from dalycapture.output import Output
     from dalycapture.source import Source
 
-MICROSECONDS: Final = 0xA1B2C3D4
-NANOSECONDS: Final = 0xA1B23C4D
-MAX_PACKET: Final = 16 << 20
 SNAP_LENGTH: Final = 262144
 
 _HEADER = "IHHIIII"

@@ -34,6 +34,17 @@ from typing import TYPE_CHECKING, Final
 
 from dalycapture.captured import CapturedPacket, Statistics, Told, possible
 from dalycapture.errors import CaptureError, TruncatedError
+from dalycapture.file_numbers import (
+    BYTE_ORDER_MAGIC,
+    ENHANCED_PACKET,
+    INTERFACE_DESCRIPTION,
+    INTERFACE_STATISTICS,
+    MAX_BLOCK,
+    NUMBERED_BLOCKS,
+    OBSOLETE_PACKET,
+    SECTION_HEADER,
+    SIMPLE_PACKET,
+)
 from dalycapture.interface import Interface
 from dalycapture.writer import CaptureWriter, counted
 
@@ -44,20 +55,8 @@ if TYPE_CHECKING:
     from dalycapture.source import Source
     from dalyref.packet import Direction
 
-SECTION_HEADER: Final = 0x0A0D0D0A
-INTERFACE_DESCRIPTION: Final = 1
-OBSOLETE_PACKET: Final = 2
-SIMPLE_PACKET: Final = 3
-INTERFACE_STATISTICS: Final = 5
-ENHANCED_PACKET: Final = 6
-
-NUMBERED_BLOCKS: Final = frozenset((0x9, 0x204, 0x216, 0xBAD, 0x40000BAD))
-"""Blocks without a packet of ours that Wireshark shows as one: journal, system call, custom. They take a number."""
-
-BYTE_ORDER_MAGIC: Final = 0x1A2B3C4D
 MOST_INTERFACES: Final = 16384
 """Of a file: each is a bus of its own to its readers, with what they remember of it."""
-MAX_BLOCK: Final = 16 << 20
 
 END, COMMENT = 0, 1
 SHB_HARDWARE, SHB_OS, SHB_APPLICATION = 2, 3, 4

@@ -17,7 +17,8 @@ from dalycapture import candump
 from dalycapture.btsnoop import MAGIC as _BTSNOOP
 from dalycapture.btsnoop import read_btsnoop
 from dalycapture.errors import CaptureError, TruncatedError, reason
-from dalycapture.pcap import MICROSECONDS, NANOSECONDS, read_pcap
+from dalycapture.file_numbers import MICROSECONDS, NANOSECONDS
+from dalycapture.pcap import read_pcap
 from dalycapture.pcapng import read_pcapng
 from dalycapture.source import Source
 

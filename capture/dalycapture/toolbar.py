@@ -16,7 +16,7 @@ import os
 import threading
 from typing import TYPE_CHECKING, Final
 
-from dalycapture.extcap import HEARD, LOG, MARK, MARK_TEXT
+from dalycapture.extcap_names import HEARD, LOG, MARK, MARK_TEXT
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,8 +17,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 from dalycapture.errors import CaptureError
-from dalycapture.pcap import MAX_PACKET, MICROSECONDS, NANOSECONDS
-from dalycapture.pcapng import BYTE_ORDER_MAGIC, ENHANCED_PACKET, MAX_BLOCK, SECTION_HEADER
+from dalycapture.file_numbers import (
+    BYTE_ORDER_MAGIC,
+    ENHANCED_PACKET,
+    MAX_BLOCK,
+    MAX_PACKET,
+    MICROSECONDS,
+    NANOSECONDS,
+    SECTION_HEADER,
+)
 
 if TYPE_CHECKING:
     from typing import BinaryIO

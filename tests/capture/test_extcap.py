@@ -20,7 +20,7 @@ from tests.capture.bus import Bus, numbered
 from tests.capture.extcap_tool import START, Home
 from tests.capture.test_passive import STRACE, calls_on, can_trace
 
-from dalycapture import extcap
+from dalycapture import extcap, extcap_names
 from dalycapture.adapters import Adapter
 from dalycapture.reader import read_capture
 from dalycapture.toolbar import message
@@ -285,16 +285,16 @@ def test_toolbar_counts_and_marks(bus: Bus, tmp_path: Path) -> None:
         bus.send(numbered(1) + numbered(2))
         until(lambda: len(capture.read()) == 2)
         os.write(capture.control, message(0, 0, ""))  # Wireshark is ready
-        os.write(capture.control, message(extcap.MARK_TEXT, 1, "charger plugged in"))
-        os.write(capture.control, message(extcap.MARK, 1, ""))
+        os.write(capture.control, message(extcap_names.MARK_TEXT, 1, "charger plugged in"))
+        os.write(capture.control, message(extcap_names.MARK, 1, ""))
         until(lambda: len(capture.read()) == 3)
         assert capture.read()[2].comment == "user mark 1: charger plugged in"
         until(lambda: capture.read() and "2 records" in capture.told.decode())
         capture.process.send_signal(signal.SIGTERM)
         assert capture.said() == ""
     told = messages(capture.told)
-    assert {control for control, command, _ in told if command == 1} == {extcap.HEARD}
-    log = "".join(text for control, command, text in told if (control, command) == (extcap.LOG, 2))
+    assert {control for control, command, _ in told if command == 1} == {extcap_names.HEARD}
+    log = "".join(text for control, command, text in told if (control, command) == (extcap_names.LOG, 2))
     assert f"listening to {bus.port}\n" in log
     assert "user mark 1: charger plugged in\n" in log
 
@@ -377,7 +377,7 @@ def test_nothing_but_listening(bus: Bus, tmp_path: Path) -> None:
     with captured(tmp_path, bus.port, under=(str(STRACE), "-f", "-y", "-o", str(trace))) as capture:
         bus.send(numbered(1))
         until(lambda: len(capture.read()) == 1)
-        os.write(capture.control, message(extcap.MARK, 1, ""))
+        os.write(capture.control, message(extcap_names.MARK, 1, ""))
         until(lambda: len(capture.read()) == 2)
         assert bus.heard() == b""
         os.close(capture.data)

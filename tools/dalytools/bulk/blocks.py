@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dalycapture.errors import CaptureError
-from dalycapture.pcapng import BYTE_ORDER_MAGIC, ENHANCED_PACKET, MAX_BLOCK, PcapngReader
+from dalycapture.file_numbers import BYTE_ORDER_MAGIC, ENHANCED_PACKET, MAX_BLOCK
+from dalycapture.pcapng import PcapngReader
 from dalycapture.source import Source
 from dalytools.bulk.packets import SPARE, Gathered, Packets
 

@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import random
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from dalytools.simulator import modbus
 from dalytools.simulator.battery import Battery
 from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, is_request, request_length, writes
 from dalytools.simulator.harm import harmed, overlaid
+from dalytools.simulator.sent import Exchange, Sent
 from dalytools.simulator.stations import NEVER, LateReply, Station, stations
 from dalytools.simulator.truth import Truth
 
@@ -38,22 +39,6 @@ NOISE = "noise"
 _TRICKS = frozenset(
     ("silent", "late", "cut_burst", "skip_frame", "repeat_frame", "other_board", "contradict", "damage")
 )
-
-
-class Sent(NamedTuple):
-    """Bytes on the wire: when their first bit begins (ns of bus time), who sends them, and what is heard."""
-
-    time_ns: int
-    sender: str  # "host", "client", "board 3"
-    data: bytes
-
-
-class Exchange(NamedTuple):
-    """What a request led to: all that was heard, whether the host takes it as answered, and when the request ended."""
-
-    sent: list[Sent]
-    answered: bool
-    request_end_ns: int
 
 
 class _Trick:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
-    from dalytools.simulator.bus import Sent
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
     from dalytools.simulator.wire import Wire, WirePacket
 
 WIRES: Final[dict[str, Callable[[Scenario], Wire]]] = {

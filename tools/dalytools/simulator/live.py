@@ -21,10 +21,11 @@ from typing import TYPE_CHECKING, Self
 from dalycapture.errors import CaptureError
 from dalytools.problem import Problem
 from dalytools.simulator.board import may_become_request, request_length
-from dalytools.simulator.bus import BITS_A_BYTE, CLIENT, HOST, Bus, Sent
+from dalytools.simulator.bus import BITS_A_BYTE, CLIENT, HOST, Bus
 from dalytools.simulator.modbus import MAX_REQUEST
 from dalytools.simulator.replay import open_replay
 from dalytools.simulator.scenario import Scenario
+from dalytools.simulator.sent import Sent
 from dalytools.simulator.terminal import Terminal
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from dalycapture.errors import CaptureError
 from dalycapture.reader import read_capture
 from dalytools.problem import Problem
-from dalytools.simulator.bus import BITS_A_BYTE, Sent
+from dalytools.simulator.bus import BITS_A_BYTE
+from dalytools.simulator.sent import Sent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -21,7 +21,7 @@ from typing import Literal, get_args
 
 from dalytools.simulator.chemistry import CHEMISTRIES
 from dalytools.simulator.faults import FAULT_BITS
-from dalytools.simulator.settings import Texts
+from dalytools.simulator.texts import Texts
 
 Dialect = Literal["a5", "d2", "81"]
 Writes = Literal["accept", "ignore", "pretend", "silent"]

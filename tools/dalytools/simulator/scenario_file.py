@@ -36,7 +36,7 @@ from dalytools.simulator.scenario import (
     Phase,
     Scenario,
 )
-from dalytools.simulator.settings import Texts
+from dalytools.simulator.texts import Texts
 from dalytools.simulator.toml_table import Table
 
 if TYPE_CHECKING:

@@ -10,12 +10,35 @@ from dalytools.simulator.board import frame
 from dalytools.simulator.scenario import HOST_BASE
 
 if TYPE_CHECKING:
-    from dalytools.simulator.bus import Bus, Sent
+    from random import Random
+
     from dalytools.simulator.scenario import Event, Foreign, Host, Scenario
+    from dalytools.simulator.sent import Exchange, Sent
+    from dalytools.simulator.truth import Truth
 
 NEVER: Final = 1 << 62  # ns
 APP_READS: Final = {"d2": ((0x00, 0x3E), (0x80, 0x29), (0xA9, 0x20)), "81": ((0x00, 0x40), (0x41, 0x3E), (0x178, 0x4A))}
 """What Daly's app reads of each dialect (field notes d, reads seen)."""
+
+
+class Pair(Protocol):
+    """The bus, as far as a station needs it."""
+
+    now_ns: int
+    timing: Random
+    truth: Truth
+
+    def wire_ns(self, data: bytes) -> int:
+        """How long these bytes occupy the wire."""
+        ...
+
+    def exchange(self, request: bytes, sender: str) -> Exchange:
+        """Send a request at ``now_ns``, with what the boards answer; moves that on."""
+        ...
+
+    def say(self, data: bytes, sender: str) -> list[Sent]:
+        """Send bytes at ``now_ns``; moves that on."""
+        ...
 
 
 class Station(Protocol):
@@ -24,11 +47,11 @@ class Station(Protocol):
     due_ns: int
     listens: bool
 
-    def speak(self, bus: Bus) -> list[Sent]:
+    def speak(self, bus: Pair) -> list[Sent]:
         """Speak at the bus's ``now_ns``, move that to the end of what follows, and set ``due_ns`` anew."""
         ...
 
-    def barge_in(self, bus: Bus) -> tuple[str, bytes, int] | None:
+    def barge_in(self, bus: Pair) -> tuple[str, bytes, int] | None:
         """Speak into what others say: name, bytes, when; sets ``due_ns`` anew. Only of one that does not listen."""
         ...
 
@@ -48,13 +71,13 @@ class PollingHost:
         if not self._requests:
             self.due_ns = NEVER
 
-    def speak(self, bus: Bus) -> list[Sent]:
+    def speak(self, bus: Pair) -> list[Sent]:
         """Send the next request, with what follows it."""
         heard = bus.exchange(self._requests[self._turn], self.host.name)
         self._go_on(bus, answered=heard.answered, request_end_ns=heard.request_end_ns)
         return heard.sent
 
-    def barge_in(self, bus: Bus) -> tuple[str, bytes, int] | None:
+    def barge_in(self, bus: Pair) -> tuple[str, bytes, int] | None:
         """Send the next request into what is on the wire: it is lost."""
         request, at = self._requests[self._turn], self.due_ns
         now, bus.now_ns = bus.now_ns, at
@@ -62,7 +85,7 @@ class PollingHost:
         bus.now_ns = now
         return self.host.name, request, at
 
-    def _go_on(self, bus: Bus, *, answered: bool, request_end_ns: int) -> None:
+    def _go_on(self, bus: Pair, *, answered: bool, request_end_ns: int) -> None:
         host = self.host
         if answered or self._tries >= host.retries:
             self._turn = (self._turn + 1) % len(self._requests)
@@ -99,7 +122,7 @@ class ForeignDevice:
         self.foreign = foreign
         self.due_ns = start_ns + int(foreign.start_s * 1e9)
 
-    def speak(self, bus: Bus) -> list[Sent]:
+    def speak(self, bus: Pair) -> list[Sent]:
         """Say it, and let it be answered."""
         foreign = self.foreign
         bus.truth.note(bus.now_ns, "foreign", name=foreign.name)
@@ -110,7 +133,7 @@ class ForeignDevice:
         self.due_ns += int(foreign.period_s * 1e9)
         return sent
 
-    def barge_in(self, bus: Bus) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
+    def barge_in(self, bus: Pair) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
         """Never: it listens."""
         return None
 
@@ -125,14 +148,14 @@ class ScriptedSend:
         self.due_ns = start_ns + int(event.at_s * 1e9)
         self._left = event.times
 
-    def speak(self, bus: Bus) -> list[Sent]:
+    def speak(self, bus: Pair) -> list[Sent]:
         """Send them, with what the boards answer."""
         sent = bus.exchange(self.event.data, self.event.sender).sent
         self._left -= 1
         self.due_ns = bus.now_ns + 100_000_000 if self._left else NEVER
         return sent
 
-    def barge_in(self, bus: Bus) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
+    def barge_in(self, bus: Pair) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
         """Never: it listens."""
         return None
 
@@ -147,7 +170,7 @@ class LateReply:
         self._name = name
         self._frames = frames
 
-    def speak(self, bus: Bus) -> list[Sent]:
+    def speak(self, bus: Pair) -> list[Sent]:
         """Say it now."""
         sent: list[Sent] = []
         for data in self._frames:
@@ -155,7 +178,7 @@ class LateReply:
         self.due_ns = NEVER
         return sent
 
-    def barge_in(self, bus: Bus) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
+    def barge_in(self, bus: Pair) -> tuple[str, bytes, int] | None:  # noqa: ARG002 - it listens
         """Never: it listens."""
         return None
 

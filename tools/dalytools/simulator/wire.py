@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dalycapture.interface import Interface
-    from dalytools.simulator.bus import Sent
+    from dalytools.simulator.sent import Sent
 
 
 class WirePacket(NamedTuple):

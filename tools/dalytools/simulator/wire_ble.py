@@ -21,8 +21,8 @@ from dalytools.simulator.wire import WirePacket
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from dalytools.simulator.bus import Sent
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
 
 HCI_WITH_DIRECTION: Final = 201
 SENT, RECEIVED = 0, 1

@@ -22,8 +22,8 @@ from dalytools.simulator.wire import WirePacket
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from dalytools.simulator.bus import Sent
     from dalytools.simulator.scenario import Foreign, Scenario
+    from dalytools.simulator.sent import Sent
 
 SOCKETCAN: Final = 227
 EXTENDED: Final = 0x8000_0000

@@ -20,8 +20,8 @@ from dalytools.simulator.wire import WirePacket
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from dalytools.simulator.bus import Sent
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
 
 ETHERNET: Final = 1
 PORT: Final = 8899  # of an EW11 as delivered

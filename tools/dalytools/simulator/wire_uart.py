@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dalycapture.framing import TimedRecord
-    from dalytools.simulator.bus import Sent
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
 
 
 class UartWire:

@@ -40,10 +40,10 @@ def copies(stream: Stream) -> Iterator[Claim]:
         index = last + 1
 
 
-def _widest(stream: Stream, index: int) -> tuple[int, int, Candidate] | None:
+def _widest(stream: Stream, index: int) -> tuple[int, int, Candidate[Stream]] | None:
     """Return the copy around a byte: the widest, then the best fit, then that at the same place, then the newest."""
 
-    def fit(found: tuple[int, int, Candidate]) -> tuple[int, int, bool, int]:
+    def fit(found: tuple[int, int, Candidate[Stream]]) -> tuple[int, int, bool, int]:
         first, last, one = found
         return last - first, one.hits - 20 * one.misses, one.index == index, -_age_ns(stream, one.source)
 
@@ -51,12 +51,12 @@ def _widest(stream: Stream, index: int) -> tuple[int, int, Candidate] | None:
     return max(((*_stretch(stream, one, index), one) for one in sure), key=fit, default=None)
 
 
-def _is_sure(one: Candidate) -> bool:
+def _is_sure(one: Candidate[Stream]) -> bool:
     together = one.hits + one.misses
     return one.hits >= _LEAST and len(one.values) >= _VALUES and one.hits >= _SHARE * together
 
 
-def _stretch(stream: Stream, sure: Candidate, index: int) -> tuple[int, int]:
+def _stretch(stream: Stream, sure: Candidate[Stream], index: int) -> tuple[int, int]:
     """Return first and last byte of a copy around one that is sure."""
     shift = sure.index - index
     first = last = index
@@ -72,7 +72,7 @@ def _stretch(stream: Stream, sure: Candidate, index: int) -> tuple[int, int]:
     return first, last
 
 
-def _goes_with(stream: Stream, sure: Candidate, index: int, shift: int) -> bool | None:
+def _goes_with(stream: Stream, sure: Candidate[Stream], index: int, shift: int) -> bool | None:
     """Tell whether a neighbour is copied too: True it moves so, False both stand still and are equal, None no."""
     source = sure.source
     there = index + shift

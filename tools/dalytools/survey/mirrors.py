@@ -9,12 +9,10 @@ byte did not is not copied either: that would be a byte that follows it later.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from dalytools.survey.stream import Stream
 
 _LOOKED_FOR: Final = 4
 """New candidates are looked for at so many changes."""
@@ -22,11 +20,23 @@ _MOST: Final = 2000
 _MOST_VALUES: Final = 32
 
 
+class Source(Protocol):
+    """A place whose bytes may be copied."""
+
+    index: int
+    """Its number among all."""
+    last: bytes
+    """Its newest payload."""
+
+
+S = TypeVar("S", bound=Source)
+
+
 @dataclass(slots=True)
-class Candidate:
+class Candidate(Generic[S]):
     """A byte that may be the one that is copied."""
 
-    source: Stream
+    source: S
     index: int
     hits: int = 0
     misses: int = 0
@@ -35,16 +45,16 @@ class Candidate:
     """Some of those with which it was equal."""
 
 
-class Mirrors:
+class Mirrors(Generic[S]):
     """Looks for the sources of every byte of one place."""
 
     __slots__ = ("_bytes", "_changes")
 
     def __init__(self, size: int) -> None:
-        self._bytes: list[dict[tuple[int, int], Candidate]] = [{} for _ in range(size)]
+        self._bytes: list[dict[tuple[int, int], Candidate[S]]] = [{} for _ in range(size)]
         self._changes = [0] * size
 
-    def take(self, mine: Stream, before: bytes, after: bytes, others: Iterable[Stream]) -> None:
+    def take(self, mine: S, before: bytes, after: bytes, others: Iterable[S]) -> None:
         """Take a payload, with the one before it. others: all places of the bus."""
         for index, value in enumerate(after):
             candidates, changed = self._bytes[index], before[index] != value
@@ -57,7 +67,7 @@ class Mirrors:
                 self._look(candidates, mine, value, others, changes - 1)
 
     @staticmethod
-    def _hold(candidates: dict[tuple[int, int], Candidate], value: int, *, changed: bool) -> None:
+    def _hold(candidates: dict[tuple[int, int], Candidate[S]], value: int, *, changed: bool) -> None:
         gone: list[tuple[int, int]] = []
         for key, candidate in candidates.items():
             if candidate.source.last[candidate.index] == value:
@@ -75,7 +85,7 @@ class Mirrors:
 
     @staticmethod
     def _look(
-        candidates: dict[tuple[int, int], Candidate], mine: Stream, value: int, others: Iterable[Stream], missed: int
+        candidates: dict[tuple[int, int], Candidate[S]], mine: S, value: int, others: Iterable[S], missed: int
     ) -> None:
         for other in others:
             if other is mine or len(candidates) >= _MOST:
@@ -85,7 +95,7 @@ class Mirrors:
                 candidates.setdefault((other.index, index), Candidate(other, index, 1, missed, {value}))
                 index = other.last.find(value, index + 1)
 
-    def of(self, index: int) -> list[Candidate]:
+    def of(self, index: int) -> list[Candidate[S]]:
         """Return what a byte was found equal to."""
         return list(self._bytes[index].values())
 

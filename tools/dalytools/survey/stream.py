@@ -29,7 +29,7 @@ class Stream:
         self.index = index
         """Its number among all."""
         self.moves = Moves(place.size)
-        self.mirrors = Mirrors(place.size)
+        self.mirrors: Mirrors[Stream] = Mirrors(place.size)
         self.samples = Samples()
         self.gaps = Quantiles()
         """From one to the next, s."""

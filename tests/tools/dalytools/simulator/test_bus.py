@@ -8,8 +8,9 @@ from itertools import islice, pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dalytools.simulator.bus import Bus, Sent, traffic
+from dalytools.simulator.bus import Bus, traffic
 from dalytools.simulator.scenario import Board, Damage, Event, Habits, Host, Pack, Scenario
+from dalytools.simulator.sent import Sent
 
 FRAME_NS = 13_541_666  # 13 x 10 / 9600 s
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dalytools.simulator.bus import Bus, Sent
+from dalytools.simulator.bus import Bus
 from dalytools.simulator.capture_file import heard
 from dalytools.simulator.harm import overlaid
 from dalytools.simulator.scenario_file import parsed, read_scenario, ready_made
@@ -14,6 +14,7 @@ from dalytools.simulator.truth import KINDS, Truth
 
 if TYPE_CHECKING:
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
 
 Notes = list[dict[str, object]]
 

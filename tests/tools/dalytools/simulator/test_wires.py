@@ -11,7 +11,7 @@ import pytest
 from dalycapture.reader import read_capture
 from dalyref.records import Kind, Splitter
 from dalytools.problem import Problem
-from dalytools.simulator.bus import Bus, Sent
+from dalytools.simulator.bus import Bus
 from dalytools.simulator.capture_file import heard, write_capture
 from dalytools.simulator.scenario_file import parsed, read_scenario
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dalytools.simulator.scenario import Scenario
+    from dalytools.simulator.sent import Sent
 
 SCENARIO = "seed = 5\n[[board]]\n[[board]]\nnumber = 2\ncells = 8\n[[host]]\nname = 'app'\n"
 SECONDS = 8.0
