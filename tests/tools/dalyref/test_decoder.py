@@ -136,6 +136,20 @@ def test_unanswered_request_comes_when_its_second_is_over() -> None:
     assert [record.number for record in out] == [1, 2, 3]
 
 
+def test_early_records_are_the_same_in_the_same_order() -> None:
+    """A screen has each at once; what is added to it later shows there too."""
+    early: list[Decoded] = []
+    decoder = Decoder(early=early.append)
+    assert decoder.feed(Packet(1, at(0), ASK)) == []
+    assert [record.number for record in early] == [1]
+    assert "daly.reply_in" not in early[0].fields
+    out = decoder.feed(Packet(2, at(50), ANSWER)) + decoder.feed(Packet(3, at(900), ASK + b"\x00" + ANSWER))
+    out += decoder.finish()
+    assert len(out) == 5
+    assert [id(record) for record in early] == [id(record) for record in out]
+    assert early[0].fields["daly.reply_in"] == 2
+
+
 def test_silent_neighbour_does_not_hold_up_for_ever() -> None:
     decoder = Decoder()
     decoder.feed(Packet(1, at(0), b"\x00"))
