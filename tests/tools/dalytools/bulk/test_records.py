@@ -188,7 +188,7 @@ def test_a_frame_that_waits_for_its_neighbour(tmp_path: Path) -> None:
 def test_what_is_left_of_a_gap_is_remembered(tmp_path: Path) -> None:
     """After a damaged frame nothing is held, but other people's frame behind it is no piece of its own."""
     others = bytes.fromhex("010300000002c40b")  # Modbus RTU: read two registers of station 1
-    bad = ANSWER[:-1] + b"\x00"
+    bad = ASK[:-1] + b"\x00"  # no piece of a Modbus frame either: it is told at once
     rows = [
         (0.0, bad),
         (0.02, others),
@@ -200,7 +200,10 @@ def test_what_is_left_of_a_gap_is_remembered(tmp_path: Path) -> None:
         (0.14, others),
     ]
     path = write_packets(tmp_path / "x.pcapng", rows)
-    assert agree(path)
+    kinds = ["bad_checksum", "junk", "frame", "foreign", "frame", "bad_checksum", "frame", "foreign"]
+    assert [piece[2] for piece in quick_pieces(path)[0]] == kinds
+    assert agree(path) == 8
+    assert agree(path, chunk=1) == 8
 
 
 def test_two_taps_one_of_them_stuck(tmp_path: Path) -> None:

@@ -136,6 +136,24 @@ def test_counts_for_a_burst_are_those_at_its_beginning_whatever_the_chunk(tmp_pa
     assert agree(path, 1, 50, 1 << 20) == 9
 
 
+def test_echoes_that_neighbours_do_not_tell(tmp_path: Path) -> None:
+    """A request that comes again within 100 ms is an echo unless it was answered (docs/records.md, 6)."""
+    ask, other = a5(0x40, 0x90), a5(0x40, 0x93)
+    answer, late = a5(1, 0x90, b"\1"), a5(1, 0x93, b"\1")
+    rows = [
+        *((0.00, ask), (0.02, other), (0.04, answer), (0.07, ask)),  # answered behind another request: the next poll
+        *((2.00, ask), (2.02, other), (2.04, late), (2.07, ask), (2.09, ask)),  # not answered: an echo, then a retry
+        *((4.00, ask), (4.02, ask), (4.04, answer), (4.06, ask), (4.08, ask)),  # echo; answered; echo again
+        *((6.00, part(1)), (6.02, a5(0x40, 0x95)), (6.04, part(2)), (6.06, a5(0x40, 0x95))),  # 2 goes on: no answer
+        *((8.00, part(2)), (8.02, a5(0x40, 0x95)), (8.04, part(2)), (8.06, a5(0x40, 0x95))),  # asked again: an answer
+    ]
+    path = write_packets(tmp_path / "x.pcapng", rows)
+    expected = [1, 1, 2, 1, 1, 1, 2, 3, 1, 1, 3, 2, 1, 3, 2, 1, 2, 3, 2, 1, 2, 1]
+    for chunk in (1, 100, 1 << 20):
+        assert [one for batch in read(path, chunk=chunk) for one in batch.direction.tolist()] == expected
+    assert agree(path, 1, 100, 1 << 20) == len(rows)
+
+
 def test_memory_is_bounded(tmp_path: Path) -> None:
     """Eight times the capture takes no more memory (numpy tells tracemalloc of its arrays)."""
 
