@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dalytools.bulk.arrays import Bytes, Flags, Ints, Words32
     from dalytools.bulk.packets import Interfaces
 
-CHUNK: Final = 1 << 21
+CHUNK: Final = 1 << 20
 """Bytes read at a time."""
 _HEAD: Final = 7
 """Words of a packet block before its data."""

@@ -37,6 +37,8 @@ class Column:
 class Table:
     """Some records of one kind, in the order of the file."""
 
+    row: Ints
+    """Which record it is, counted from 0 over the whole file."""
     number: Ints
     """Packet in which the record ends, as Wireshark counts."""
     time_ns: Ints
@@ -51,4 +53,4 @@ class Table:
 
     def __len__(self) -> int:
         """Return the number of rows."""
-        return len(self.number)
+        return len(self.row)

@@ -52,8 +52,12 @@ class Batch:
     """Whole tables of cell voltages, mV: with the batch in which they are complete."""
     sensors: Table | None
     """Whole tables of temperatures, C."""
-    texts: list[tuple[int, int, int, int, str, str]]
-    """Number, time, interface, address, field, text: whole texts, with the batch in which they are complete."""
+    texts: list[tuple[int, int, int, int, int, str, str]]
+    """Record over the whole file, number, time, interface, address, field, text: whole texts, once complete."""
+    first_row: int
+    """Number of the first of `records` over the whole file, from 0."""
+    open_from: int
+    """Of records from this one on, over the whole file, more may be told with later batches."""
     modbus: dict[int, Fields]
     """By row of `records`: what a Modbus frame says."""
 
@@ -110,6 +114,7 @@ class Decoder:
         found = tables.Found()
         batch = self._decode(records, found)
         _whole(batch, found)
+        batch.open_from = min(self.open_bursts(), default=self._rows)
         return batch
 
     def finish(self, records: Records) -> Batch:
@@ -121,14 +126,14 @@ class Decoder:
         _whole(batch, found)
         return batch
 
-    def open_bursts(self) -> frozenset[tuple[int, int]]:
-        """Return number and time of the last record of each burst whose table or text is not told yet."""
+    def open_bursts(self) -> frozenset[int]:
+        """Return the last record, over the whole file, of each burst whose table or text is not told yet."""
         running = (bus.running for bus in self._buses.values())
-        return frozenset(burst.told[:2] for burst in running if burst.parts and not burst.count)
+        return frozenset(burst.told[0] for burst in running if burst.parts and not burst.count)
 
     def _decode(self, records: Records, found: tables.Found) -> Batch:
         count = len(records)
-        batch = Batch(records, np.zeros(count, np.uint8), {}, {}, None, None, [], {})
+        batch = Batch(records, np.zeros(count, np.uint8), {}, {}, None, None, [], self._rows, self._rows + count, {})
         if not count:
             return batch
         now_ns = risen(records.time_ns, self._now_ns)
@@ -230,8 +235,8 @@ class Decoder:
         lot.base[row] = judged.base
         if len(judged.at) and judged.first[0] < 0:
             count[judged.first < 0] = bus.running.count
-        bursts = tables.Bursts(frames, judged, count, lot.batch.records, lot.found)
-        bus.running = bursts.find(bus.running, self._rows)
+        bursts = tables.Bursts(frames, judged, count, lot.batch.records, self._rows, lot.found)
+        bus.running = bursts.find(bus.running)
         packs = np.flatnonzero(reply & (data_id == _PACK))
         mos = np.flatnonzero(reply & (data_id == _MOS))
         state = bus.state.look(packs, address[packs], mos, address[mos], frames.byte(4)[mos])
@@ -294,7 +299,7 @@ def _add_tables(lot: _Lot) -> None:
                 state = count_of[rows]
                 columns["daly.pack.state"] = Column(np.maximum(state, 0).astype(np.uint8), state >= 0)
         if columns:
-            batch.replies[data_id] = _table(records, rows, columns)
+            batch.replies[data_id] = _table(batch, rows, columns)
     requests = np.flatnonzero(direction == REQUEST)
     ids = raw[requests, 2]
     for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
@@ -302,7 +307,7 @@ def _add_tables(lot: _Lot) -> None:
             rows = requests[ids == data_id]
             columns = payloads.of_writes(data_id, rows_of(records.words, rows)[:, 4:12])
             if columns:
-                batch.writes[data_id] = _table(records, rows, columns)
+                batch.writes[data_id] = _table(batch, rows, columns)
 
 
 def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Column]:
@@ -320,9 +325,18 @@ def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Colu
     return {"daly.frame_number": Column(data[:, 0]), name: Column(values, length=real)}
 
 
-def _table(records: Records, rows: Ints, columns: dict[str, Column]) -> Table:
+def _table(batch: Batch, rows: Ints, columns: dict[str, Column]) -> Table:
+    records = batch.records
     address = records.words.view(np.uint8).reshape(-1, 16)[rows, 1]
-    return Table(records.number[rows], records.time_ns[rows], records.interface[rows], address, BOARD[address], columns)
+    return Table(
+        batch.first_row + rows,
+        records.number[rows],
+        records.time_ns[rows],
+        records.interface[rows],
+        address,
+        BOARD[address],
+        columns,
+    )
 
 
 def _whole(batch: Batch, found: tables.Found) -> None:
@@ -330,6 +344,6 @@ def _whole(batch: Batch, found: tables.Found) -> None:
     batch.cells = tables.table(cells.CELLS, found.rows[cells.CELLS], BOARD)
     batch.sensors = tables.table(cells.TEMPERATURES, found.rows[cells.TEMPERATURES], BOARD)
     batch.texts = [
-        (number, time_ns, interface, address, texts.FIELDS[data_id], text)
-        for number, time_ns, interface, address, data_id, text in sorted(found.texts)
+        (row, number, time_ns, interface, address, texts.FIELDS[data_id], text)
+        for row, number, time_ns, interface, address, data_id, text in sorted(found.texts)
     ]

@@ -34,13 +34,15 @@ if TYPE_CHECKING:
 
 _LOT: Final = 16384
 _LISTS: Final = frozenset(("daly.cell.voltage", "daly.temperature", "daly.cells.voltage", "daly.sensors.temperature"))
+_Numbered = tuple[int, "Decoded"]
+"""A record and which it is, over the whole file."""
 _TEXTS: Final = frozenset(texts.FIELDS.values())
 
 
-def batches(path: Path | str, options: Options, given: int, open_bursts: frozenset[tuple[int, int]]) -> Iterator[Batch]:
+def batches(path: Path | str, options: Options, given: int, open_bursts: frozenset[int]) -> Iterator[Batch]:
     """Yield the records of a capture behind the first `given`.
 
-    open_bursts: number and time of the last record of bursts that had not ended by then: what is told of them as a
+    open_bursts: the last record of bursts that had not ended by then: what is told of them as a
     whole is still to be given. Raises CaptureError as ``read_capture`` does, after all records before the damage.
     """
     problem: CaptureError | None = None
@@ -56,22 +58,23 @@ def batches(path: Path | str, options: Options, given: int, open_bursts: frozens
         yield from plain.finish()
 
     records = decoded()
-    late = [one for one in islice(records, given) if (one.number, one.time_ns) in open_bursts]
-    first = True
-    while (lot := list(islice(records, _LOT))) or first:
-        yield _batch(lot, late if first else [])
-        first = False
+    late = [(row, one) for row, one in enumerate(islice(records, given)) if row in open_bursts]
+    row = given
+    while (lot := list(islice(records, _LOT))) or late:
+        yield _batch(lot, row, late)
+        row += len(lot)
+        late = []
     if problem:
         raise problem
 
 
-def _batch(lot: Sequence[Decoded], late: Sequence[Decoded]) -> Batch:
+def _batch(lot: Sequence[Decoded], first_row: int, late: Sequence[_Numbered]) -> Batch:
     raw = bytearray()
     others: dict[int, bytes] = {}
     directions: list[int] = []
     modbus: dict[int, Fields] = {}
-    replies: dict[int, list[Decoded]] = {}
-    asked: dict[int, list[Decoded]] = {}
+    replies: dict[int, list[_Numbered]] = {}
+    asked: dict[int, list[_Numbered]] = {}
     for row, one in enumerate(lot):
         dialect = one.fields.get("daly.dialect")
         direction = one.fields.get("daly.direction", 0)
@@ -86,9 +89,9 @@ def _batch(lot: Sequence[Decoded], late: Sequence[Decoded]) -> Batch:
         mine = frame and dialect == Dialect.A5.value
         directions.append(direction if mine and isinstance(direction, int) else 0)
         if directions[-1] == REPLY:
-            replies.setdefault(one.data[2], []).append(one)
+            replies.setdefault(one.data[2], []).append((first_row + row, one))
         elif directions[-1] == REQUEST and one.fields.get("daly.write"):
-            asked.setdefault(one.data[2], []).append(one)
+            asked.setdefault(one.data[2], []).append((first_row + row, one))
     dialects = [None if one.fields.get("daly.dialect") is None else one.fields["daly.dialect"] for one in lot]
     names = [None if each is None else each.value for each in DIALECTS]
     records = Records(
@@ -103,7 +106,7 @@ def _batch(lot: Sequence[Decoded], late: Sequence[Decoded]) -> Batch:
         others,
         {one.number: one.comment for one in lot if one.comment},
     )
-    whole = [*late, *lot]
+    whole = [*late, *enumerate(lot, first_row)]
     return Batch(
         records,
         np.array(directions, np.uint8),
@@ -112,11 +115,13 @@ def _batch(lot: Sequence[Decoded], late: Sequence[Decoded]) -> Batch:
         _whole_table(whole, cells.CELLS),
         _whole_table(whole, cells.TEMPERATURES),
         [
-            (one.number, one.time_ns, one.interface, one.data[1], name, str(one.fields[name]))
-            for one in whole
+            (row, one.number, one.time_ns, one.interface, one.data[1], name, str(one.fields[name]))
+            for row, one in whole
             if one.kind.value == "frame"
             for name in sorted(_TEXTS & one.fields.keys())
         ],
+        first_row,
+        first_row + len(lot),
         modbus,
     )
 
@@ -128,9 +133,9 @@ def _single(name: str) -> bool:
     return not name.startswith(tuple(prefix for prefix, _ in FIELDS.values()))
 
 
-def _whole_table(records: Sequence[Decoded], data_id: int) -> Table | None:
+def _whole_table(records: Sequence[_Numbered], data_id: int) -> Table | None:
     prefix, name = FIELDS[data_id]
-    rows = [one for one in records if one.kind.value == "frame" and prefix + name in one.fields and not _modbus(one)]
+    rows = [(row, one) for row, one in records if prefix + name in one.fields and not _modbus(one)]
     return _table(rows, lambda field: field.startswith(prefix)) if rows else None
 
 
@@ -138,10 +143,12 @@ def _modbus(one: Decoded) -> bool:
     return one.fields.get("daly.dialect") != Dialect.A5.value
 
 
-def _table(rows: Sequence[Decoded], wanted: Callable[[str], bool]) -> Table:
+def _table(numbered: Sequence[_Numbered], wanted: Callable[[str], bool]) -> Table:
+    rows = [one for _, one in numbered]
     names = dict.fromkeys(name for one in rows for name in one.fields if wanted(name))
     address = np.array([one.data[1] for one in rows], np.uint8)
     return Table(
+        np.array([row for row, _ in numbered], np.int64),
         np.array([one.number for one in rows], np.int64),
         np.array([one.time_ns for one in rows], np.int64),
         np.array([one.interface for one in rows], np.int64),

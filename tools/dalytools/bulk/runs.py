@@ -51,8 +51,8 @@ class Running:
     """What its frames carry behind their number, by number."""
     first_row: int = 0
     """Of its first frame, counted over the whole file."""
-    told: tuple[int, int, int] = (0, 0, 0)
-    """Of its last frame: packet, time, interface."""
+    told: tuple[int, int, int, int] = (0, 0, 0, 0)
+    """Of its last frame: record over the whole file, packet, time, interface."""
 
     @property
     def is_burst(self) -> bool:

@@ -34,10 +34,14 @@ FIELDS: Final = {
 }
 
 
+_Text = tuple[int, int, int, int, int, int, str]
+
+
 @dataclass(slots=True)
 class Rows:
     """Tables that were found, of one ID: cells in mV, or sensors' bytes as sent."""
 
+    row: list[Ints] = field(default_factory=list["Ints"])
     number: list[Ints] = field(default_factory=list["Ints"])
     time_ns: list[Ints] = field(default_factory=list["Ints"])
     interface: list[Ints] = field(default_factory=list["Ints"])
@@ -46,8 +50,9 @@ class Rows:
     slots: list[Array] = field(default_factory=list["Array"])
 
     def add(self, told: Sequence[Ints], address: Ints, length: Ints, slots: Array) -> None:
-        """Take some rows; told: number, time and interface of their records. slots: rows x width."""
-        number, time_ns, interface = told
+        """Take some rows; told: row, number, time and interface of their records. slots: rows x width."""
+        row, number, time_ns, interface = told
+        self.row.append(row)
         self.number.append(number)
         self.time_ns.append(time_ns)
         self.interface.append(interface)
@@ -62,8 +67,10 @@ class Found:
 
     rows: dict[int, Rows] = field(default_factory=lambda: {data_id: Rows() for data_id in _WIDTH})
     """By data ID."""
-    texts: list[tuple[int, int, int, int, int, str]] = field(default_factory=list[tuple[int, int, int, int, int, str]])
-    """Number, time, interface, address, data ID, text."""
+    texts: list[tuple[int, int, int, int, int, int, str]] = field(
+        default_factory=list[tuple[int, int, int, int, int, int, str]]
+    )
+    """Record, number, time, interface, address, data ID, text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +82,13 @@ class Bursts:
     count: Ints
     """Of cells or sensors at the beginning of each reply's burst, 0: not known."""
     records: Records
+    first_row: int
+    """Number of the lot's first record over the whole file."""
     found: Found
     """Takes what is complete."""
 
-    def find(self, running: Running, first_row: int) -> Running:
-        """Find the tables and texts, given the burst that was running; return the one that is running at the end.
-
-        first_row: number of the lot's first record over the whole file.
-        """
+    def find(self, running: Running) -> Running:
+        """Find the tables and texts, given the burst that was running; return the one that is running at the end."""
         frames, runs, found = self.frames, self.runs, self.found
         at = runs.at
         if not len(at):
@@ -103,16 +109,16 @@ class Bursts:
             odd = np.isin(data_id[begins], _TEXTS) | (np.isin(data_id[begins], list(_WIDTH)) & repeated[begins])
             for index in np.flatnonzero(odd).tolist():
                 members = range(bounds[index], bounds[index + 1])
-                last = self._one_by_one(members, self._begun(members[0], first_row), found)
+                last = self._one_by_one(members, self._begun(members[0]), found)
                 if index + 1 < len(begins):
                     ended(last, found)
             members = range(bounds[-2], len(at))
             # What can be told of it already was told above.
-            current = self._one_by_one(members, self._begun(members[0], first_row), Found())
+            current = self._one_by_one(members, self._begun(members[0]), Found())
         current.asked = _asked(frames.part(slice(int(at[-1]) + 1, None)), current.data_id)
         return current
 
-    def _begun(self, index: int, first_row: int) -> Running:
+    def _begun(self, index: int) -> Running:
         place = int(self.runs.at[index])
         data = self.frames.bytes_of(place)
         base = int(self.runs.base[index])
@@ -123,7 +129,7 @@ class Bursts:
             count=int(self.count[index]),
             whole=True,
             number=base - 1,
-            first_row=first_row + int(self.frames.row[place]),
+            first_row=self.first_row + int(self.frames.row[place]),
         )
 
     def _one_by_one(self, members: range, burst: Running, found: Found) -> Running:
@@ -135,7 +141,8 @@ class Bursts:
             row = int(frames.row[place])
             data = frames.bytes_of(place)
             burst.end_ns = int(frames.end_ns[place])
-            burst.told = (int(records.number[row]), int(records.time_ns[row]), int(records.interface[row]))
+            where = (int(records.number[row]), int(records.time_ns[row]), int(records.interface[row]))
+            burst.told = (self.first_row + row, *where)
             number = int(self.runs.number[index])
             if number < 0:
                 burst.number = number
@@ -183,7 +190,7 @@ class Bursts:
             slots = raw[:, :, 5:12].reshape(len(which), width).astype(np.int64)
         slots[np.arange(width) >= length[:, None]] = 0
         row = frames.row[at[index[which]]]
-        told = (records.number[row], records.time_ns[row], records.interface[row])
+        told = (self.first_row + row, records.number[row], records.time_ns[row], records.interface[row])
         address = frames.byte(1)[at[index[which]]].astype(np.int64)
         self.found.rows[data_id].add(told, address, length, slots)
 
@@ -229,14 +236,13 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
     """Return the tables found as columns: all slots, how many, lowest and highest and which, average, spread."""
     if not rows.number:
         return None
-    number, time_ns, interface, address, length = (
-        np.concatenate(column) for column in (rows.number, rows.time_ns, rows.interface, rows.address, rows.length)
-    )
+    parts = (rows.row, rows.number, rows.time_ns, rows.interface, rows.address, rows.length)
+    row, number, time_ns, interface, address, length = (np.concatenate(column) for column in parts)
     width = max(part.shape[1] for part in rows.slots)
     slots = np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in rows.slots])
-    order = np.argsort(number, kind="stable")
-    number, time_ns, interface, address, length, slots = (
-        column[order] for column in (number, time_ns, interface, address, length, slots)
+    order = np.argsort(row)
+    row, number, time_ns, interface, address, length, slots = (
+        column[order] for column in (row, number, time_ns, interface, address, length, slots)
     )
     prefix, name = FIELDS[data_id]
     there: Flags = np.arange(width, dtype=np.int64)[None, :] < np.asarray(length, np.int64)[:, None]
@@ -255,6 +261,7 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
     valid = None if some.all() else some
     byte_address = address.astype(np.uint8)
     return Table(
+        row,
         number,
         time_ns,
         interface,

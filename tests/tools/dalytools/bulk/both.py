@@ -100,7 +100,7 @@ def plain_fields(decoded: Iterable[Decoded]) -> list[tuple[int, Fields]]:
 def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = None) -> list[tuple[int, Fields]]:
     """The same from the columns, put together again."""
     out: list[tuple[int, Fields]] = []
-    where: dict[tuple[int, int], Fields] = {}  # by number and time: fields of A5 frames
+    where: dict[int, Fields] = {}  # by record: fields of A5 frames of which more may be told
 
     def take(batch: Batch) -> None:
         records = batch.records
@@ -117,18 +117,21 @@ def quick_fields(path: Path, *, chunk: int = CHUNK, options: Options | None = No
                 fields["daly.direction"] = direction
                 if board := int(BOARD[address]):
                     fields["daly.board"] = board
-                where[number, int(records.time_ns[row])] = fields
+                where[batch.first_row + row] = fields
         for table in (*batch.replies.values(), *batch.writes.values(), batch.cells, batch.sensors):
             if table is not None:
                 for row in range(len(table)):
-                    fields = where[int(table.number[row]), int(table.time_ns[row])]
+                    fields = where[int(table.row[row])]
+                    assert out[int(table.row[row])][0] == table.number[row]
                     for name, column in table.columns.items():
                         value = column.value(row)
                         if value is not None:
                             assert name not in fields
                             fields[name] = value
-        for number, time_ns, _, _, name, text in batch.texts:
-            where[number, time_ns][name] = text
+        for row, _, _, _, _, name, text in batch.texts:
+            where[row][name] = text
+        for row in [row for row in where if row < batch.open_from]:
+            del where[row]
 
     try:
         for batch in read(path, options, chunk=chunk):
