@@ -209,6 +209,7 @@ class BlockReader:
             factor = 10 ** (9 - side.resolution)
             good &= ~(mine & (ticks > (1 << 62) // factor))
             out = np.where(mine & good, ticks * factor + side.offset_s * 1_000_000_000, out)
+            good &= out >= 0  # before 1970: the plain reader has its word for it
         return out
 
     def _plain(self, start: int, stop: int) -> None:

@@ -81,8 +81,8 @@ class Gathered:
 
     def add(self, packet: Packet, offset: int) -> None:
         """Take a packet whose data will stand at `offset`. Raises CaptureError for a time that no column can hold."""
-        if not -(1 << 63) <= packet.time_ns < 1 << 63:
-            raise CaptureError(f"packet {packet.number}: its time stamp is outside of the years 1678 to 2261")
+        if packet.time_ns >= 1 << 63:
+            raise CaptureError(f"packet {packet.number}: its time stamp is after the year 2261")
         self.number.append(packet.number)
         self.time_ns.append(packet.time_ns)
         self.interface.append(packet.interface)

@@ -93,7 +93,7 @@ def test_damaged_anywhere(tmp_path: Path) -> None:
             _, problem = quick_pieces(path, chunk=1000)
         except UnlikeError:  # the link type was hit
             continue
-        if "1678" not in problem:  # a time that no column can hold is said
+        if "2261" not in problem:  # a time that no column can hold is said
             agree(path, chunk=r.choice((100, 1000, 1 << 20)))
             compared += 1
     assert compared > 170
@@ -146,8 +146,17 @@ def test_sections_orders_and_times(
 
 def test_a_time_that_no_column_holds_is_said(tmp_path: Path) -> None:
     path = tmp_path / "x.pcapng"
-    path.write_bytes(section("<", 6) + packet("<", 1 << 63, ASK))
-    assert quick_pieces(path)[1] == "packet 1: its time stamp is outside of the years 1678 to 2261"
+    path.write_bytes(section("<", 9) + packet("<", 1 << 63, ASK))
+    assert quick_pieces(path)[1] == "packet 1: its time stamp is after the year 2261"
+
+
+def test_impossible_times_are_the_plain_reader_s(tmp_path: Path) -> None:
+    """Before 1970, by the interface's offset, or beyond 64 bits: no time."""
+    path = tmp_path / "x.pcapng"
+    path.write_bytes(section("<", 6, -9) + packet("<", 8_000_000, ASK) + packet("<", 10_000_000, ANSWER))
+    assert agree(path) == 2
+    path.write_bytes(section("<", 6) + packet("<", 1 << 63, ASK) + packet("<", EPOCH_NS // 1000, ANSWER))
+    assert agree(path) == 2
 
 
 def test_other_formats(tmp_path: Path) -> None:
