@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The checksums of IP and TCP (RFC 1071), made right again where they were right, and as wrong as before where not."""
+"""The checksums of IP and TCP (RFC 1071), made right again where they were right, and wrong where they were wrong.
+
+By how much they were wrong is not kept: a sum over what was blanked, or the difference to one, would tell of it.
+"""
 
 from __future__ import annotations
 
 import struct
+from typing import Final
+
+_WRONG: Final = 0x5555
 
 
 def internet(data: bytes) -> int:
@@ -22,8 +28,8 @@ def renewed(old: bytes, new: bytes, at: int) -> int:
     there = int.from_bytes(old[at : at + 2])
     if not there:
         return 0
-    wrong_by = there ^ _right(old, at)
-    return _right(new, at) ^ wrong_by
+    wrong = there != _right(old, at)
+    return _right(new, at) ^ (_WRONG if wrong else 0)
 
 
 def _right(data: bytes, at: int) -> int:

@@ -31,7 +31,7 @@ class Copies:
     def learn(self, raw: bytes) -> None:
         """Remember a value, or a part of one."""
         value = raw.strip(_PADDING)
-        if len(value) < SHORTEST or value in self.values:
+        if not legible(value) or value in self.values:
             return
         if len(self.values) < _MOST_VALUES:
             self.values[value] = None
@@ -40,16 +40,30 @@ class Copies:
             windows = self._windows.setdefault(size, set())
             for at in range(len(shape) - size + 1):
                 window = shape[at : at + size]
-                if window.strip(_PADDING) and self._count < _MOST_WINDOWS:
+                if legible(window) and self._count < _MOST_WINDOWS:
                     self._count += window not in windows
                     windows.add(window)
 
-    def find(self, data: bytes) -> Iterator[tuple[int, int]]:
-        """Yield (start, stop) of each place where a copy stands; places may overlap."""
+    def find(self, data: bytes) -> list[tuple[int, int]]:
+        """Return (start, stop) of each place where a copy stands, in order."""
+        out: list[tuple[int, int]] = []
+        for start, stop in sorted(self._found(data)):
+            if out and start <= out[-1][1]:
+                out[-1] = (out[-1][0], max(stop, out[-1][1]))
+            else:
+                out.append((start, stop))
+        return out
+
+    def _found(self, data: bytes) -> Iterator[tuple[int, int]]:
         for size, windows in self._windows.items():
             for at in range(len(data) - size + 1):
                 if data[at : at + size] in windows:
                     yield at, at + size
+
+
+def legible(value: bytes) -> bool:
+    """Tell whether four characters or more are letters, digits or signs: what has fewer could be any number."""
+    return sum(0x21 <= byte <= 0x7E for byte in value) >= SHORTEST
 
 
 def shapes(value: bytes) -> set[bytes]:

@@ -28,6 +28,7 @@ from dalytools.redact.blanker import Blanker
 from dalytools.redact.copies import Copies, shapes
 from dalytools.redact.fill import Fill
 from dalytools.redact.labels import Labels
+from dalytools.redact.lines import OutOfStepError
 from dalytools.redact.redactor import Redactor
 from dalytools.redact.tally import Tally
 
@@ -79,6 +80,11 @@ def redact(source: str, target: str, options: Options, keep: frozenset[What]) ->
         beside.replace(place)
     except CaptureError as error:
         raise Problem(str(error)) from None
+    except OutOfStepError:
+        raise Problem(
+            f"{source}: the records are not the bytes of its packets, a defect of this program, so nothing was "
+            "written; please tell us"
+        ) from None
     except OSError as error:
         raise Problem(f"{target} can not be written: {reason(error)}") from None
     finally:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """Bytes that belong to no good frame: blanked, but for what says that they are damaged, and how.
 
-bad_checksum   A5 addr id 08 | eight bytes, blanked | a sum that is as wrong as it was
+bad_checksum   A5 addr id 08 | eight bytes, blanked | a sum that is as wrong as it was (of texts: by 1)
 short          the head of the frame that it began; the rest blanked
 junk           blanked; 00 and FF stay
 foreign        the frames of other protocols keep their shape, and their check bytes are made right again
@@ -31,7 +31,8 @@ def bad_checksum(data: bytes, blanker: Blanker) -> bytes:
     content = _a5_content(data, blanker)
     if content == data[_HEAD : a5.SIZE - 1]:
         return data
-    wrong_by = data[-1] - a5.checksum(data[:-1])
+    # Over a text the sum, or its difference to one, would tell of it.
+    wrong_by = 1 if _is_secret(data[2]) else data[-1] - a5.checksum(data[:-1])
     head = data[:_HEAD] + content
     return head + bytes(((a5.checksum(head) + wrong_by) & 0xFF,))
 
@@ -48,10 +49,15 @@ def _a5_content(data: bytes, blanker: Blanker) -> bytes:
     """Blank what stands behind the head of a damaged A5 frame, up to its sum."""
     content = data[_HEAD : _HEAD + a5_layout.SIZE]
     where = "frames with a wrong checksum" if len(data) == a5.SIZE else "cut-off frames"
-    spans = a5_layout.request(data[2]) or a5_layout.reply(data[2])
-    if any(span.what in TEXTS or span.what in DATES for span in spans):
+    if _is_secret(data[2]):
         return blanker.spans(content, [(0, len(content) - 1, What.STALE)], where)
     return blanker.whole(content, What.DAMAGED, where)
+
+
+def _is_secret(data_id: int) -> bool:
+    """Tell whether frames of an ID carry texts or dates."""
+    spans = a5_layout.request(data_id) or a5_layout.reply(data_id)
+    return any(span.what in TEXTS or span.what in DATES for span in spans)
 
 
 def junk(data: bytes, blanker: Blanker) -> bytes:

@@ -68,7 +68,7 @@ class NetworkPackets:
 
     def feed(self, held: Held) -> list[Packet]:
         """Blank a packet, and return what has come in order for the decoder."""
-        out = self._segments.pass_packets(held.packet.number)
+        out = self._segments.pass_packet(held.packet)
         data = held.packet.data
         start = self._link(held)
         ip = None if start is None else _ip(data, start)

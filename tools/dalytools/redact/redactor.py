@@ -19,7 +19,7 @@ from dalytools.redact.carriers import Carriers
 from dalytools.redact.labels import comment
 from dalytools.redact.lines import Held
 from dalytools.redact.structure import Structure
-from dalytools.redact.what import LOOKED_FOR, named
+from dalytools.redact.what import LOOKED_FOR_FIELDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -106,8 +106,8 @@ class Redactor:
 
     def _learn(self, fields: Fields) -> None:
         """Take what was put together of several frames."""
-        for name, value in fields.items():
-            if isinstance(value, str) and named(name.removeprefix("daly.")) in LOOKED_FOR:
+        for name in LOOKED_FOR_FIELDS:
+            if isinstance(value := fields.get(name), str):
                 self._blanker.learn(value.encode())
 
     def _blank(self, record: Decoded) -> bytes:

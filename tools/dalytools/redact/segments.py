@@ -31,7 +31,8 @@ _MOST_HELD: Final = 1 << 16
 """Bytes of a direction that wait for a gap to be filled."""
 _MOST_WAITING: Final = 1024
 _LONGEST_WAIT: Final = 4096
-"""Packets that may come before the gap is filled."""
+"""Packets, or a little more, that may come before the gap is filled."""
+_LOOK_EVERY: Final = 512
 _MOST_CONNECTIONS: Final = 1024
 
 End = tuple[bytes, int]
@@ -79,20 +80,25 @@ class Segments:
         self._connections: dict[tuple[End, End], _Connection] = {}
         self._waiting: dict[tuple[str, End], _Connection] = {}
         self._names = 0
+        self._latest: Packet | None = None
 
     def feed(self, segment: Segment) -> list[Packet]:
-        """Return what has come in order."""
+        """Return what has come in order. All of it counts to this packet: the decoder wants numbers in order."""
         out: list[Packet] = []
+        self._latest = segment.held.packet
         connection = self._connection(segment, out)
         self._take(connection, segment, out)
         return out
 
-    def pass_packets(self, number: int) -> list[Packet]:
+    def pass_packet(self, packet: Packet) -> list[Packet]:
         """Give up what has waited for too many packets, up to this one."""
         out: list[Packet] = []
+        self._latest = packet
+        if packet.number % _LOOK_EVERY:
+            return out
         for (_, end), connection in list(self._waiting.items()):
             side = connection.sides[end]
-            while side.waiting and min(one.held.packet.number for one in side.waiting) < number - _LONGEST_WAIT:
+            while side.waiting and min(one.held.packet.number for one in side.waiting) < packet.number - _LONGEST_WAIT:
                 self._skip(connection, end, out)
         return out
 
@@ -135,8 +141,8 @@ class Segments:
             self._blank(segment)
             return
         if _ahead(sequence, side.next) <= 0:
-            self._hand(connection, side, segment, segment.held, out)
-            self._drain(connection, side, segment.held, out)
+            self._hand(connection, side, segment, out)
+            self._drain(connection, side, out)
         else:
             at = len(side.waiting)
             while at and _ahead(side.waiting[at - 1].sequence, sequence) > 0:
@@ -156,19 +162,19 @@ class Segments:
         side = connection.sides[end]
         side.next = side.waiting[0].sequence
         side.lost = True
-        self._drain(connection, side, max((one.held for one in side.waiting), key=lambda held: held.packet.number), out)
+        self._drain(connection, side, out)
         if not side.waiting:
             self._waiting.pop((connection.name, end), None)
 
-    def _drain(self, connection: _Connection, side: _Side, by: Held, out: list[Packet]) -> None:
-        """Hand over what waited, as far as it is in order now. by: the packet that it counts to."""
+    def _drain(self, connection: _Connection, side: _Side, out: list[Packet]) -> None:
+        """Hand over what waited, as far as it is in order now."""
         while side.waiting and _ahead(side.waiting[0].sequence, side.next) <= 0:
             segment = side.waiting.pop(0)
             side.held -= segment.size
             segment.held.undecided -= segment.size
-            self._hand(connection, side, segment, by, out)
+            self._hand(connection, side, segment, out)
 
-    def _hand(self, connection: _Connection, side: _Side, segment: Segment, by: Held, out: list[Packet]) -> None:
+    def _hand(self, connection: _Connection, side: _Side, segment: Segment, out: list[Packet]) -> None:
         """Hand over what is new in a segment that begins where the line ends, or before."""
         again = min(_ahead(side.next, segment.sequence), segment.size)
         self._blank(segment._replace(size=again))
@@ -177,7 +183,7 @@ class Segments:
         direction: Direction = "outbound" if segment.source == connection.first else "inbound"
         if size:
             self._line(connection.name, direction).add(segment.held, start, size)
-            packet = by.packet
+            packet = self._latest or segment.held.packet
             out.append(
                 Packet(
                     number=packet.number,

@@ -50,6 +50,8 @@ TEXTS = frozenset(
 LOOKED_FOR = frozenset((What.BATTERY_CODE, What.SERIAL_NUMBER, What.PASSWORD))
 """Looked for in the whole capture, wherever a copy of them may stand."""
 
+LOOKED_FOR_FIELDS = tuple("daly." + name for name, what in _SECRET.items() if what in LOOKED_FOR)
+
 DATES = frozenset((What.PRODUCTION_DATE, What.CLOCK))
 
 OPAQUE = frozenset((What.UNKNOWN, What.FOREIGN, What.DAMAGED))

@@ -16,6 +16,7 @@ from dalycapture.create import open_writer
 from dalycapture.interface import Interface
 from dalycapture.reader import read_capture
 from dalyref.options import Options
+from dalytools.cli import main
 from dalytools.redact.copy import redact
 
 if TYPE_CHECKING:
@@ -55,6 +56,15 @@ def test_nothing_is_left(pair: tuple[Path, Path]) -> None:
 def test_packets_times_and_lengths_stay(pair: tuple[Path, Path]) -> None:
     old, new = (list(read_capture(path)) for path in pair)
     assert [(p.time_ns, len(p.data), p.number) for p in old] == [(p.time_ns, len(p.data), p.number) for p in new]
+
+
+def test_check_finds_nothing_new(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    before, after = made.capture(tmp_path / "in.pcapng", size=11), tmp_path / "out.pcapng"
+    before.chmod(0o644)
+    assert main(["redact", str(before), "-w", str(after)]) == 0
+    after.chmod(0o644)
+    assert main(["check", "--fail-on", "note", "--baseline", str(before), str(after)]) == 0
 
 
 def redacted(folder: Path, rows: list[Row]) -> list[bytes]:

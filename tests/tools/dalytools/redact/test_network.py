@@ -7,6 +7,8 @@ import struct
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from tests.tools.dalytools.made import a5
 from tests.tools.dalytools.redact import planted_network as made
 from tests.tools.dalytools.redact.planted import CODE, left, texts
@@ -30,10 +32,11 @@ from tests.tools.dalytools.redact.planted_network import (
 
 from dalycapture.reader import read_capture
 from dalyref.options import Options
+from dalytools.cli import main
 from dalytools.redact.copy import redact
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
 ADDRESSES = (LAPTOP, SERVER, LAPTOP_MAC, SERVER_MAC, LAPTOP_6, SERVER_6)
@@ -64,6 +67,16 @@ def test_nothing_is_left(tmp_path: Path) -> None:
                 assert internet(packet[26:34] + (end - 34).to_bytes(4) + b"\0\0\0\6" + packet[34:end]) == 0
 
 
+def test_check_finds_nothing_new(tmp_path: Path) -> None:
+    """Segments late, again and overlapping; none is lost, for what is behind a gap the two readings differ about."""
+    tmp_path.chmod(0o755)
+    before, after = capture(tmp_path / "in.pcapng", list(segments())[:-2]), tmp_path / "out.pcapng"
+    assert main(["redact", str(before), "-w", str(after)]) == 0
+    after.chmod(0o644)
+    words = ["--tcp-ports", str(made.PORT), "--fail-on", "note"]
+    assert main(["check", *words, "--baseline", str(before), str(after)]) == 0
+
+
 def test_a_frame_over_two_segments(tmp_path: Path) -> None:
     """The same but for seven letters and the addresses: all of both packets by hand."""
     code, new = texts(0x57, b"ABCDEFG")[0], a5(1, 0x57, b"\1XXXXXXX")
@@ -91,6 +104,16 @@ def test_behind_a_gap(tmp_path: Path) -> None:
     assert [packet[54:] for packet in out] == [pack, a5(1, 0x57, b"\1" + SHOUT), pack]
 
 
+def test_gaps_of_several_connections(tmp_path: Path) -> None:
+    """Some are given up at the end only, after others went on: bytes go back where they came from."""
+    code = texts(0x57, b"ABCDEFG")[0]
+    packets = [to_laptop(at, code[:8], port=port) for port in (1, 2) for at in (10, 900, 700, 500, 18)]
+    packets += [to_laptop(508, code[8:], port=1), to_laptop(26, code[:3], port=2)]
+    redacted(tmp_path, packets)
+    assert left((tmp_path / "out.pcapng").read_bytes()) == []
+    assert b"BCD" not in (tmp_path / "out.pcapng").read_bytes()
+
+
 def test_cut_off_by_the_snap_length(tmp_path: Path) -> None:
     """The first frame is whole, of the second three bytes are there: blanked. The checksum can't be known: 0."""
     pack, code = a5(1, 0x90, bytes.fromhex("0210000075300329")), texts(0x57, b"ABCDEFG")[0]
@@ -103,13 +126,13 @@ def test_cut_off_by_the_snap_length(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("wrong_by", [0, 1, 0x1234])
 def test_checksums_that_were_wrong_stay_so(wrong_by: int, tmp_path: Path) -> None:
-    """As wrong as before, whatever was blanked; one that was not calculated stays 0."""
+    """Wrong, but not by as much: that would tell of what was blanked. One that was not calculated stays 0."""
     packet = bytearray(to_laptop(10, texts(0x57, b"ABCDEFG")[0]))
     there = int.from_bytes(packet[50:52]) ^ wrong_by
     packet[50:52] = there.to_bytes(2)
     (new,) = redacted(tmp_path, [bytes(packet)])
     right = internet(new[26:34] + (len(new) - 34).to_bytes(4) + b"\0\0\0\6" + new[34:50] + b"\0\0" + new[52:])
-    assert int.from_bytes(new[50:52]) == right ^ wrong_by
+    assert int.from_bytes(new[50:52]) == right ^ (0x5555 if wrong_by else 0)
     packet[50:52] = b"\0\0"
     (new,) = redacted(tmp_path, [bytes(packet)])
     assert new[50:52] == b"\0\0"
@@ -155,6 +178,30 @@ def test_a_new_connection_with_the_same_ends(tmp_path: Path) -> None:
         to_server(6, code),
     ]
     assert [packet[54:] for packet in redacted(tmp_path, packets)][1::2] == [a5(1, 0x57, b"\1" + SHOUT)] * 2
+
+
+CODES = b"".join([a5(0x40, 0x57), *texts(0x57, CODE)] * 3)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from((to_server, to_laptop)),
+            st.sampled_from((1, 2)),
+            st.integers(0, len(CODES)),
+            st.integers(0, 40),
+            st.sampled_from((made.PUSH | made.ACK, made.SYN, made.RST | made.ACK)),
+        ),
+        max_size=30,
+    )
+)
+def test_segments_in_any_order(tmp_path: Path, pieces: list[tuple[Callable[..., bytes], int, int, int, int]]) -> None:
+    """Any pieces of two connections, late, lost, again, overlapping: no five characters of the code are left."""
+    packets = [side(100 + at, CODES[at : at + size], flags=flags, port=port) for side, port, at, size, flags in pieces]
+    new = redacted(tmp_path, packets)
+    assert [len(packet) for packet in packets] == [len(packet) for packet in new]
+    assert left((tmp_path / "out.pcapng").read_bytes()) == []
 
 
 @pytest.mark.parametrize("length", range(0, 70, 3))

@@ -168,6 +168,9 @@ def test_damage_stays_the_damage_it_was(tmp_path: Path) -> None:
     bad = bad[:-1] + bytes(((bad[-1] + 3) & 0xFF,))
     out = redacted(tmp_path, [bad, b"secret\xff\0", a5(0x40, 0x90)[:7]], apart_ms=1000)
     assert out == [bytes.fromhex("a5019008") + bytes(8) + b"\x41", bytes(6) + b"\xff\0", a5(0x40, 0x90)[:7]]
+    code = texts(0x57, b"ABCDEFG")[0]
+    (out,) = redacted(tmp_path, [code[:-1] + bytes((code[-1] ^ 0x40,))])
+    assert out == bytes.fromhex("a5015708") + bytes(8) + b"\x06"  # 105, and 1
 
 
 def test_other_peoples_frames(tmp_path: Path) -> None:
@@ -219,8 +222,11 @@ def test_copies_in_every_order() -> None:
     copies = Copies()
     copies.learn(b"\0\0abcdefgh  ")
     for text in (b"cdefgh", b"hgfedc", b"dcfehg", b"cbedgf", b"ghefcd"):
-        assert list(copies.find(b"--" + text + b"--")), text
-    assert not list(copies.find(b"abcde ghijkl"))
+        assert copies.find(b"--" + text + b"--") == [(2, 8)], text
+    assert copies.find(b"abcdefgh") == [(0, 8)]
+    assert not copies.find(b"abcde ghijkl")
+    copies.learn(b"\1\0\0\0\0\0\1ABC")  # could be any number
+    assert not copies.find(b"\1\0\0\0\0\0\1\0")
 
 
 def test_labels() -> None:
