@@ -45,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "or move with a quantity that is known. What is not sure is not said."
     )
     parser.epilog = "Exit status: 0 surveyed, 2 could not run, or a file did not read to its end (what did is shown)."
-    parser.add_argument("files", nargs="+", metavar="FILE", help="capture file, or a log of candump -L")
-    parser.add_argument("--diff", action="store_true", help="of two files, what is different in the second")
+    parser.add_argument("files", nargs="*", metavar="FILE", help="capture file, or a log of candump -L")
+    parser.add_argument("--diff", nargs=2, metavar=("A", "B"), help="instead: what is different in B")
     Wanted.add_arguments(parser)
     parser.add_argument("-o", "--output", metavar="OUT.html", help="write a page to look at, instead of the listing")
     parser.add_argument("--json", metavar="OUT", help="all of it for programs; - is standard output")
@@ -57,13 +57,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Survey all files together, or each of two for their difference."""
-    files: list[str] = args.files
+    files: list[str] = args.diff or args.files
+    if args.diff and args.files:
+        raise Problem("--diff compares two captures; name no other")
+    if not files:
+        raise Problem("name a capture, or two behind --diff")
     outputs: list[str] = [name for name in (args.output, args.json) if name and name != "-"]
     for output in outputs:
         if os.path.realpath(output) in {os.path.realpath(name) for name in files}:
             raise Problem(f"{output} is one of the captures; name another file")
-    if args.diff and len(files) != 2:
-        raise Problem("--diff compares two files: name the one before and the one after")
     wanted = Wanted.read(args)
     problems: list[str] = []
     sets = [[name] for name in files] if args.diff else [files]
@@ -71,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
     for problem in problems:
         print(f"dalyshark survey: {plain(problem)}", file=sys.stderr)  # noqa: T201
     for some, survey in zip(sets, surveys, strict=True):
+        if not survey.streams and problems:
+            return 2
         if not survey.streams:
             raise Problem(f"{', '.join(some)}: no good frame of a Daly bus in what was read")
     found = [findings(survey, wanted.place) for survey in surveys]

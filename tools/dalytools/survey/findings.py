@@ -65,7 +65,8 @@ def findings(survey: Survey, wanted: Callable[[Place], bool] = lambda _: True) -
     for stream in survey.streams.values():
         if not wanted(stream.place):
             continue
-        finding = Finding(stream, names(stream.place, stream.last))
+        known = ((),) * stream.place.size if stream.unknown else names(stream.place, stream.last)
+        finding = Finding(stream, known)
         finding.group = _group(finding)
         if stream.place.size:
             finding.claims = _claims(finding, looked_at)

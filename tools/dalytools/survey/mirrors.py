@@ -9,34 +9,27 @@ byte did not is not copied either: that would be a byte that follows it later.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Final, Generic
+
+from dalytools.survey.newest import Source
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from dalytools.survey.newest import Newest
 
 _LOOKED_FOR: Final = 4
 """New candidates are looked for at so many changes."""
-_MOST: Final = 2000
+_TRIED: Final = 16
+"""Or at the first so many, where most new values stand everywhere."""
+_COMMON: Final = 300
+"""A value that stands in more bytes than this tells nothing."""
 _MOST_VALUES: Final = 32
 
 
-class Source(Protocol):
-    """A place whose bytes may be copied."""
-
-    index: int
-    """Its number among all."""
-    last: bytes
-    """Its newest payload."""
-
-
-S = TypeVar("S", bound=Source)
-
-
 @dataclass(slots=True)
-class Candidate(Generic[S]):
+class Candidate(Generic[Source]):
     """A byte that may be the one that is copied."""
 
-    source: S
+    source: Source
     index: int
     hits: int = 0
     misses: int = 0
@@ -45,17 +38,18 @@ class Candidate(Generic[S]):
     """Some of those with which it was equal."""
 
 
-class Mirrors(Generic[S]):
+class Mirrors(Generic[Source]):
     """Looks for the sources of every byte of one place."""
 
-    __slots__ = ("_bytes", "_changes")
+    __slots__ = ("_bytes", "_changes", "_looked")
 
     def __init__(self, size: int) -> None:
-        self._bytes: list[dict[tuple[int, int], Candidate[S]]] = [{} for _ in range(size)]
+        self._bytes: list[dict[tuple[int, int], Candidate[Source]]] = [{} for _ in range(size)]
         self._changes = [0] * size
+        self._looked = [0] * size
 
-    def take(self, mine: S, before: bytes, after: bytes, others: Iterable[S]) -> None:
-        """Take a payload, with the one before it. others: all places of the bus."""
+    def take(self, mine: Source, before: bytes, after: bytes, newest: Newest[Source]) -> None:
+        """Take a payload, with the one before it. newest: of all places of the bus."""
         for index, value in enumerate(after):
             candidates, changed = self._bytes[index], before[index] != value
             if candidates:
@@ -63,11 +57,12 @@ class Mirrors(Generic[S]):
             if not changed:
                 continue
             changes = self._changes[index] = self._changes[index] + 1
-            if changes <= _LOOKED_FOR:
-                self._look(candidates, mine, value, others, changes - 1)
+            if self._looked[index] < _LOOKED_FOR and changes <= _TRIED and newest.count(value) <= _COMMON:
+                self._looked[index] += 1
+                self._look(candidates, mine, value, newest, changes - 1)
 
     @staticmethod
-    def _hold(candidates: dict[tuple[int, int], Candidate[S]], value: int, *, changed: bool) -> None:
+    def _hold(candidates: dict[tuple[int, int], Candidate[Source]], value: int, *, changed: bool) -> None:
         gone: list[tuple[int, int]] = []
         for key, candidate in candidates.items():
             if candidate.source.last[candidate.index] == value:
@@ -85,17 +80,17 @@ class Mirrors(Generic[S]):
 
     @staticmethod
     def _look(
-        candidates: dict[tuple[int, int], Candidate[S]], mine: S, value: int, others: Iterable[S], missed: int
+        candidates: dict[tuple[int, int], Candidate[Source]],
+        mine: Source,
+        value: int,
+        newest: Newest[Source],
+        missed: int,
     ) -> None:
-        for other in others:
-            if other is mine or len(candidates) >= _MOST:
-                continue
-            index = other.last.find(value)
-            while index >= 0:
+        for other, index in newest.where(value):
+            if other is not mine:
                 candidates.setdefault((other.index, index), Candidate(other, index, 1, missed, {value}))
-                index = other.last.find(value, index + 1)
 
-    def of(self, index: int) -> list[Candidate[S]]:
+    def of(self, index: int) -> list[Candidate[Source]]:
         """Return what a byte was found equal to."""
         return list(self._bytes[index].values())
 

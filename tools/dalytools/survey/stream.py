@@ -12,8 +12,8 @@ from dalytools.survey.samples import Samples
 
 if TYPE_CHECKING:
     from array import array
-    from collections.abc import Iterable
 
+    from dalytools.survey.newest import Newest
     from dalytools.survey.place import Place
 
 NANO = 1_000_000_000
@@ -44,15 +44,17 @@ class Stream:
         """How many payloads there were."""
         return self.moves.count
 
-    def add(self, time_ns: int, data: bytes, known: array[float], others: Iterable[Stream]) -> None:
-        """Take the next payload. known: of the battery, at this moment. others: all places of the bus."""
+    def add(self, time_ns: int, data: bytes, known: array[float], newest: Newest[Stream]) -> None:
+        """Take the next payload. known: of the battery, at this moment. newest: of all places of the bus."""
         if self.moves.count:
             self.gaps.add(max(0, time_ns - self.last_ns) / NANO)
-            self.mirrors.take(self, self.last, data, others)
+            self.mirrors.take(self, self.last, data, newest)
         else:
             self.first_ns = time_ns
         self.last_ns = time_ns
-        self.last = data
+        if data != self.last or not self.moves.count:
+            self.last = data
+            newest.put(self)
         self.moves.add(data)
         if data:
             self.samples.add(time_ns, data, known)

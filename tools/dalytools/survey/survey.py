@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 from dalyref.kinds import Kind
 from dalyref.packet import CanFrame
 from dalytools.survey.known import Known
+from dalytools.survey.newest import Newest
 from dalytools.survey.place import A5, REPLY
 from dalytools.survey.stream import NANO, Stream
 from dalytools.survey.units import MOST_PAGES, of_can, units
@@ -41,7 +42,7 @@ class Survey:
         self._made = 0
         self._known = Known()
         self._buses: dict[int, str] = {}
-        self._by_bus: dict[str, list[Stream]] = {}
+        self._newest: dict[str, Newest[Stream]] = {}
         self._pending: deque[CanFrame] = deque()
         self._paged: set[Place] = set()
         self._asked: dict[Place, bool] = {}
@@ -129,13 +130,11 @@ class Survey:
         self._paged.add(place)
         if before.count == 1:  # the first frame of the first answer
             del self.streams[place]
-            self._by_bus[place.bus].remove(before)
             self._take(replace(place, page=min(before.last[0], MOST_PAGES)), before.last, before.last_ns, unknown=True)
         return replace(place, page=min(data[0], MOST_PAGES))
 
     def _take(self, place: Place, data: bytes, time_ns: int, *, unknown: bool = False) -> None:
         stream = self.streams.get(place)
-        of_bus = self._by_bus.setdefault(place.bus, [])
         if stream is None:
             if len(self.streams) >= MOST_PLACES:
                 self.left_out += 1
@@ -143,5 +142,5 @@ class Survey:
             stream = self.streams[place] = Stream(place, self._made)
             self._made += 1
             stream.unknown = unknown
-            of_bus.append(stream)
-        stream.add(time_ns, data, self._known.of(place.bus, place.board), of_bus)
+        newest = self._newest.setdefault(place.bus, Newest())
+        stream.add(time_ns, data, self._known.of(place.bus, place.board), newest)

@@ -139,6 +139,9 @@ def test_the_same_capture_twice(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "Nothing changed: 4 places unchanged" in capsys.readouterr().out
 
 
-def test_two_files_are_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["survey", "--diff", str(tmp_path / "one.pcapng")]) == 2
-    assert "name the one before and the one after" in capsys.readouterr().err
+def test_two_captures_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["survey", "one.pcapng", "--diff", "two.pcapng", "three.pcapng"]) == 2
+    assert main(["survey"]) == 2
+    said = capsys.readouterr().err
+    assert "name no other" in said
+    assert "name a capture, or two behind --diff" in said

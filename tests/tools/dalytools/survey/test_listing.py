@@ -106,7 +106,10 @@ def test_no_capture_is_overwritten_and_none_is_a_line(
 ) -> None:
     assert main(["survey", str(capture), "-o", str(capture)]) == 2
     assert main(["survey", str(capture), "--json", str(capture)]) == 2
+    capsys.readouterr()
     assert main(["survey", str(tmp_path / "none.pcapng")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert main(["survey", str(capture), "-o", str(capture)]) == 2
     empty = write(tmp_path / "empty.pcapng", [(0.0, b"")])
     assert main(["survey", str(empty)]) == 2
     said = capsys.readouterr().err
