@@ -96,15 +96,16 @@ def measure(folder: Path, records: int, repeat: int) -> Result:
         "Parquet": sum(path.stat().st_size for path in files),
         "CSV of 13 columns": (folder / "fleet.csv").stat().st_size,
     }
-    ((first,),) = base.execute("SELECT count(*) FROM fleet WHERE file = ?", [str(captures[0][1])]).fetchall()
+    first_day = "SELECT count(*) FROM fleet WHERE site = ? AND day = ?"
+    ((first,),) = base.execute(first_day, [SITES[0], DAYS[0]]).fetchall()
     again = _run("decode", str(captures[0][1]), "--format", "jsonl", "-o", "/dev/null") * count / first
     result = Result(
         f"Fleet: {count} records in {len(files)} files, DuckDB {duckdb.__version__}, one thread",
         ("query", "Parquet, s", "CSV scan, s", "CSV / Parquet", "decode again / Parquet"),
         note="\n".join(
             (
-                f"CPU time. Decoding all captures again takes {again:.0f} s (from one of them). "
-                + (f"Making the data set took {making:.0f} s, once." if making else ""),
+                f"CPU time. Decoding all captures again takes {again:.0f} s (from one of them)."
+                + (f" Making the data set took {making:.0f} s, once." if making else ""),
                 "Sizes: " + ", ".join(f"{name} {size / 1e6:.0f} MB" for name, size in sizes.items()) + ".",
             )
         ),
