@@ -40,6 +40,8 @@ TURNS = (
     ("reframe", "--raw", "{file}", "-w", "{out}.pcapng"),
     ("report", "{file}", "-o", "{out}.html"),
     ("survey", "{file}"),
+    ("decode", "--format", "csv", "--rows", "moment", "{file}", "-o", "{out}.csv"),
+    ("decode", "--format", "parquet", "{file}", "-o", "{out}.parquet"),
     ("redact", "{file}", "-w", "{out}.pcapng"),
 )
 BATCH = 250

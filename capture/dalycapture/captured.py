@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dalycapture.interface import Interface
 
 
-MOST_NS: Final = 0xFFFFFFFF_FFFFFFFF
+MOST_NS: Final = 0x7FFFFFFF_FFFFFFFF  # the year 2262; tables and plots hold signed numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Statistics:
 
 
 def possible(time_ns: int) -> int:
-    """Return ns since 1970; 0, which is no time, for what no capture can hold: before 1970, or more than 64 bits."""
+    """Return ns since 1970; 0, which is no time, for what a capture can not mean: before 1970, after 2262."""
     return time_ns if 0 <= time_ns <= MOST_NS else 0
 
 

@@ -108,6 +108,15 @@ def test_a_pcapng_time_that_no_capture_can_hold_is_no_time(resolution: int, offs
     assert one.time_ns == 0
 
 
+def test_a_time_behind_2262_is_no_time(tmp_path: Path) -> None:
+    """Whoever keeps times as signed 64-bit numbers, as tables do, could not take it."""
+    with open_writer(tmp_path / "x.pcapng") as writer:
+        writer.add_interface(tap("x"))
+        for time_ns in ((1 << 63) - 1, 1 << 63):
+            writer.write_packet(time_ns, b"x")
+    assert [packet.time_ns for packet in read_capture(tmp_path / "x.pcapng")] == [(1 << 63) - 1, 0]
+
+
 def test_classic_pcap_has_32_bits_for_seconds(tmp_path: Path) -> None:
     path = tmp_path / "x.pcap"
     with open_writer(path, "pcap") as writer:
