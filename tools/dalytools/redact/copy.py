@@ -110,6 +110,8 @@ class _Original:
         for packet in _read(self.source, "redact, reading", Told(), broken):
             redactor.feed(packet)
         redactor.finish()
+        if not tally.packets:
+            raise Problem(f"{self.source}: the capture holds no packet, so there is nothing to copy")
         return redactor.structure.digest(), "".join(broken)
 
     def write(self, beside: Path, fill: int) -> Tally:

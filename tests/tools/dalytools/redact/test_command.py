@@ -63,6 +63,7 @@ def test_a_capture_cut_off_gives_what_it_has(tmp_path: Path, capsys: pytest.Capt
         (["missing", "-w", "OUT"], "missing: there is no such file"),
         (["IN", "-w", "TEXT"], "is not a capture file, so it is not overwritten"),
         (["TEXT", "-w", "OUT"], "is a text file, not a capture"),
+        (["EMPTY", "-w", "OUT"], "the capture holds no packet"),
         (["-", "-w", "OUT"], "reads and proves files"),
         (["IN", "-w", "-"], "reads and proves files"),
         (["IN", "-w", "OUT", "--json", "IN"], "is one of the captures"),
@@ -73,6 +74,7 @@ def test_a_capture_cut_off_gives_what_it_has(tmp_path: Path, capsys: pytest.Capt
 def test_what_can_not_be(words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "TEXT").write_text("three years of work", encoding="utf-8")
     (tmp_path / "IN").write_bytes(CYCLE.read_bytes())
+    write_serial(tmp_path / "EMPTY", [])
     (tmp_path / "LINK").symlink_to(tmp_path / "IN")
     try:
         status = main(["redact", *(str(tmp_path / word) if word.isupper() else word for word in words)])
@@ -134,7 +136,7 @@ def test_any_traffic_keeps_its_records(tmp_path: Path, seed: int) -> None:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.sampled_from((0, 1, 101, 113, 147, 187, 201, 227, 250, 254, 276, 999)),
-    st.lists(st.binary(max_size=80), max_size=12),
+    st.lists(st.binary(max_size=80), min_size=1, max_size=12),
 )
 def test_any_bytes_under_any_link_type(tmp_path: Path, link_type: int, packets: list[bytes]) -> None:
     """Nothing breaks, and lengths stay."""
