@@ -15,4 +15,4 @@ def test_committed_outputs_are_tsharks(tmp_path: Path) -> None:
     subprocess.run([sys.executable, DOCS / "make_statistics.py", made], check=True, timeout=120)
     text = made.read_text(encoding="utf-8")
     assert (DOCS / "statistics.md").read_text(encoding="utf-8") == text, "out of date: make docs"
-    assert text.count("    Daly BMS: ") == 3
+    assert text.count("    Daly BMS: ") == 4
