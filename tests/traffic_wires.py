@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The trouble of tests/traffic.py on other wires (docs/wires.md), packet by packet, as capture files hold it.
+
+    tcp   each packet of a side is a segment; some come again, some change places, some (with losses) never come
+    ble   each packet of a side is one or several ATT values, some over several HCI packets; other devices talk as well
+    can   classic frames, both directions, HKMS registers, inverters, standard, remote, short and strange ones
+
+Deterministic by seed. Ports and attributes: PORTS, HANDLES.
+"""
+
+from __future__ import annotations
+
+import random
+import struct
+from typing import TYPE_CHECKING, NamedTuple
+
+from tests.traffic import EPOCH_NS, QUIET_MS, RARELY_MS, Traffic
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+RAW_IP, HCI_WITH_DIRECTION, SOCKETCAN = 101, 201, 227
+PORT = 4001
+WRITE, NOTIFY, OTHER = 0x0F, 0x11, 0x20
+HANDLES = f"{WRITE},{NOTIFY}"
+
+
+class OnWire(NamedTuple):
+    """One packet: time, bytes."""
+
+    time_ns: int
+    data: bytes
+
+
+def segment(side: int, connection: int, sequence: int, data: bytes) -> bytes:
+    """Lay bytes into an IPv4 packet with a TCP segment; checksums are left out."""
+    ports = (50000 + connection, PORT) if side == 0 else (PORT, 50000 + connection)
+    head = struct.pack(">HHIIBBHHH", *ports, sequence & 0xFFFFFFFF, 0, 0x50, 0x18, 0x2000, 0, 0)
+    ends = (bytes((192, 0, 2, 10)), bytes((192, 0, 2, 20)))
+    length = 20 + len(head) + len(data)
+    ip = struct.pack(">BBHHHBBH", 0x45, 0, length, 1, 0, 64, 6, 0) + ends[side] + ends[1 - side]
+    return ip + head + data
+
+
+def tcp(seed: int, *, lossy: bool = False) -> Iterator[OnWire]:
+    """Yield segments of four connections. lossy: some never come, and none change places."""
+    r = random.Random(seed)
+    following: dict[tuple[int, int], int] = {}
+    kept: tuple[tuple[int, int], bytes] | None = None
+    for made in Traffic(seed).packets():
+        if not made.data:
+            continue
+        key = (made.interface, made.direction - 1 if made.direction else r.randrange(2))
+        sequence = following.get(key, 0xFFFFF000)  # they begin anew soon
+        following[key] = sequence + len(made.data)
+        packet = segment(key[1], key[0], sequence, made.data)
+        luck = r.random()
+        if lossy and luck < 0.01:
+            continue
+        if kept is not None and kept[0] != key:
+            yield OnWire(made.time_ns, kept[1])
+            kept = None
+        if not lossy and luck < 0.02 and kept is None:
+            kept = (key, packet)
+            continue
+        yield OnWire(made.time_ns, packet)
+        if luck > 0.98:
+            yield OnWire(made.time_ns + 1000, packet)
+        if kept is not None:
+            yield OnWire(made.time_ns + 2000, kept[1])
+            kept = None
+
+
+def lossy_tcp(seed: int) -> Iterator[OnWire]:
+    """Yield segments some of which never come."""
+    return tcp(seed, lossy=True)
+
+
+def _acl(received: int, connection: int, pdu: bytes, sizes: list[int]) -> Iterator[bytes]:
+    """Cut an ATT packet into HCI data packets."""
+    rest = struct.pack("<HH", len(pdu), 4) + pdu
+    first = True
+    while rest:
+        size = sizes.pop() if sizes else len(rest)
+        piece, rest = rest[: max(4, size)], rest[max(4, size) :]
+        flags = 0x1000 if not first else 0x2000 if received else 0
+        yield struct.pack(">I", received) + struct.pack("<BHH", 2, connection | flags, len(piece)) + piece
+        first = False
+
+
+def _discovery(connection: int) -> Iterator[bytes]:
+    complete = struct.pack("<BBBBHBB6sHHHB", 0x3E, 19, 1, 0, connection, 0, 0, bytes(6), 24, 0, 72, 0)
+    yield struct.pack(">I", 1) + b"\x04" + complete
+    yield from _acl(0, connection, struct.pack("<BHHH", 0x08, 1, 0xFFFF, 0x2803), [])
+    found = b"".join(
+        struct.pack("<HBHH", handle - 1, 0x14, handle, uuid)
+        for handle, uuid in ((WRITE, 0xFFF2), (NOTIFY, 0xFFF1), (OTHER, 0x2A19))
+    )
+    yield from _acl(1, connection, b"\x09\x07" + found, [])
+
+
+def ble(seed: int) -> Iterator[OnWire]:
+    """Yield HCI packets of four connections with a board's module, and of other devices."""
+    r = random.Random(seed)
+    for connection in range(4):
+        for data in _discovery(0x40 + connection):
+            yield OnWire(EPOCH_NS - 1_000_000_000, data)
+    for made in Traffic(seed).packets():
+        if not made.data:
+            continue
+        connection = 0x40 + made.interface
+        board = made.direction - 1 if made.direction else r.randrange(2)
+        luck = r.random()
+        if luck < 0.002:
+            for data in _discovery(connection):
+                yield OnWire(made.time_ns, data)
+        elif luck < 0.02:
+            for data in _acl(1, connection, struct.pack("<BH", 0x1B, OTHER) + made.data, []):
+                yield OnWire(made.time_ns, data)
+        elif luck < 0.03:
+            text = r.choice((b"AT+VER=?\r\n", b"+VER:1\r\n", b"OK", b"HiLink", b"ERROR x"))
+            for data in _acl(board, connection, _head(r, board) + text, []):
+                yield OnWire(made.time_ns, data)
+        size = r.choice((20, 20, 244))
+        for at in range(0, len(made.data), size):
+            pdu = _head(r, board) + made.data[at : at + size]
+            pieces = list(_acl(board, connection, pdu, [r.choice((7, 12, 27))] if r.random() < 0.05 else []))
+            if len(pieces) > 1 and r.random() < 0.2:
+                del pieces[-1]  # a piece is missing
+            for data in pieces:
+                yield OnWire(made.time_ns, data)
+
+
+def _head(r: random.Random, board: int) -> bytes:
+    if board:
+        return struct.pack("<BH", r.choice((0x1B, 0x1B, 0x1D)), NOTIFY)
+    return struct.pack("<BH", r.choice((0x52, 0x52, 0x12)), WRITE)
+
+
+_KEEP_ALIVE = 0x0400FF80
+_INVERTERS = (0x351, 0x355, 0x356, 0x359, 0x35C, 0x35E, 0x4200, 0x4210, 0x7310, 0x0400FF81, 0x18DA10F1, 0x7DF)
+
+
+def can(seed: int) -> Iterator[OnWire]:
+    """Yield frames of a bus; without a keep-alive for the first half of a thousand."""
+    r = random.Random(seed)
+    source = Traffic(seed).packets()
+    now = EPOCH_NS
+    count = 0
+    while True:
+        count += 1
+        now += r.choice(RARELY_MS if r.random() < 0.02 else QUIET_MS) * 1_000_000 + r.randrange(900_000)
+        luck = r.random()
+        if luck < 0.55:
+            data = next(source).data
+            for at in range(0, len(data) - 12, 13):
+                if data[at] != 0xA5:
+                    break
+                board, host = r.choice((1, 1, 2, 16, data[at + 1])), r.choice((0x40, 0x40, 0x41, 0x80, 0x20))
+                ends = (board, host) if data[at + 1] >= 0x20 else (host, board)
+                yield OnWire(now, _frame(r, 0x18 << 24 | data[at + 2] << 16 | ends[0] << 8 | ends[1], data[at + 4 : at + 12]))
+                now += r.choice((0, 1, 20)) * 1_000_000
+        elif luck < 0.6 and count > 500:
+            yield OnWire(now, _frame(r, _KEEP_ALIVE, bytes(8), plain=True))
+        elif luck < 0.85:
+            register = r.choice((*range(0x400, 0x40F), 0x400, 0x400, 0x401, 0x408, 0x40E, 0x182A, 0x182C, 0x161E, 0x181E))
+            ends = r.choice(((0x80, 1), (0xFF, 1), (1, 0x80), (0x80, 2), (2, 0x40)))
+            payload = bytearray(r.randbytes(8))
+            if register in (0x400, 0x401, 0x40E):
+                payload[0] = r.choice((0, 1, 1, 2, 2, 3, 4, 5, 6, 0xFF))
+            if register == 0x408 and r.random() < 0.8:
+                payload[:2] = bytes((r.choice((4, 8, 16)), r.choice((1, 2, 8))))
+            yield OnWire(now, _frame(r, register << 16 | ends[0] << 8 | ends[1], bytes(payload)))
+        else:
+            identifier = r.choice(_INVERTERS) if r.random() < 0.7 else r.getrandbits(29)
+            yield OnWire(now, _frame(r, identifier, r.randbytes(8)))
+
+
+def _frame(r: random.Random, identifier: int, data: bytes, *, plain: bool = False) -> bytes:
+    """One SocketCAN packet; now and then shorter, remote, an error frame, CAN FD, or cut off."""
+    flags = 0x80000000 if identifier > 0x7FF or r.random() < 0.1 else 0
+    fd = 0
+    luck = 1.0 if plain else r.random()
+    if luck < 0.03:
+        data = data[: r.randrange(8)]
+    elif luck < 0.04:
+        flags |= 0x40000000
+        data = b""
+    elif luck < 0.045:
+        flags |= 0x20000000
+    elif luck < 0.05:
+        fd = 4
+    packet = (flags | identifier).to_bytes(4, "big") + bytes((len(data), fd, 0, 0)) + data
+    return packet[:-2] if 0.05 <= luck < 0.055 else packet
