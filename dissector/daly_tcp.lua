@@ -16,7 +16,7 @@ local M = {}
 
 local ONE_MORE_SEGMENT = 0x0FFFFFFF -- DESEGMENT_ONE_MORE_SEGMENT, which not every version gives Lua
 
-local stream_number = Field.new("tcp.stream")
+local stream_number, segment_length = Field.new("tcp.stream"), Field.new("tcp.len")
 
 local capture -- options, buses by connection, results by slot (see daly_streams)
 local slots -- of frames, see feed()
@@ -72,6 +72,10 @@ local function begins(bus, side, raw, left, time)
   local sides = held[bus] or {}
   held[bus] = sides
   local before, times = sides[side], {}
+  local fresh = segment_length()
+  if fresh and fresh.value == #raw then
+    before = nil -- nothing in front
+  end
   if before and raw:sub(1, #before.bytes) == before.bytes then
     times = before.times
   else

@@ -51,7 +51,7 @@ def tcp(seed: int, *, lossy: bool = False) -> Iterator[OnWire]:
         if not made.data:
             continue
         key = (made.interface, made.direction - 1 if made.direction else r.randrange(2))
-        sequence = following.get(key, 0xFFFFF000)  # they begin anew soon
+        sequence = following.get(key, 1000)
         following[key] = sequence + len(made.data)
         packet = segment(key[1], key[0], sequence, made.data)
         luck = r.random()
@@ -138,6 +138,7 @@ def _head(r: random.Random, board: int) -> bytes:
 
 
 _KEEP_ALIVE = 0x0400FF80
+_WRITTEN = (0x182A, 0x182C, 0x161E, 0x181E)
 _INVERTERS = (0x351, 0x355, 0x356, 0x359, 0x35C, 0x35E, 0x4200, 0x4210, 0x7310, 0x0400FF81, 0x18DA10F1, 0x7DF)
 
 
@@ -158,12 +159,13 @@ def can(seed: int) -> Iterator[OnWire]:
                     break
                 board, host = r.choice((1, 1, 2, 16, data[at + 1])), r.choice((0x40, 0x40, 0x41, 0x80, 0x20))
                 ends = (board, host) if data[at + 1] >= 0x20 else (host, board)
-                yield OnWire(now, _frame(r, 0x18 << 24 | data[at + 2] << 16 | ends[0] << 8 | ends[1], data[at + 4 : at + 12]))
+                identifier = 0x18 << 24 | data[at + 2] << 16 | ends[0] << 8 | ends[1]
+                yield OnWire(now, _frame(r, identifier, data[at + 4 : at + 12]))
                 now += r.choice((0, 1, 20)) * 1_000_000
         elif luck < 0.6 and count > 500:
             yield OnWire(now, _frame(r, _KEEP_ALIVE, bytes(8), plain=True))
         elif luck < 0.85:
-            register = r.choice((*range(0x400, 0x40F), 0x400, 0x400, 0x401, 0x408, 0x40E, 0x182A, 0x182C, 0x161E, 0x181E))
+            register = r.choice((*range(0x400, 0x40F), 0x400, 0x400, 0x401, 0x408, 0x40E, *_WRITTEN))
             ends = r.choice(((0x80, 1), (0xFF, 1), (1, 0x80), (0x80, 2), (2, 0x40)))
             payload = bytearray(r.randbytes(8))
             if register in (0x400, 0x401, 0x40E):

@@ -7,7 +7,7 @@ import itertools
 from typing import TYPE_CHECKING
 
 import pytest
-from bench.soak import likely_bus, trouble, write
+from bench.soak import KINDS, WIRES, likely_bus, trouble, write
 
 from dalytools.comparison import compare
 
@@ -31,3 +31,16 @@ def test_both_readings_agree(tshark: Tshark, make: Callable[[int], Iterator[Made
     assert result.kinds["frame"] > 2500
     if make is trouble:
         assert min(result.kinds[kind] for kind in ("bad_checksum", "short", "junk", "foreign", "event")) > 5
+
+
+@pytest.mark.parametrize("kind", ["can", "ble", "tcp", "lossy-tcp"])
+def test_both_readings_agree_on_every_wire(tshark: Tshark, kind: str) -> None:
+    link_type, made = KINDS[kind](104)
+    path = tshark.home / f"{kind}.pcapng"
+    write(path, itertools.islice(made, 3000), link_type)
+    path.chmod(0o644)
+    result = compare(tshark, path, wires=WIRES)
+    assert [str(difference) for difference in result.differences[:5]] == []
+    assert result.left_out == 0
+    assert result.kinds["frame"] > 1500
+    assert result.kinds["foreign"] > 20
