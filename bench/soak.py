@@ -2,8 +2,9 @@
 """``make soak``: a million records, good and damaged, through both readings; none may differ.
 
 In turn a bus as it could be (the simulator, with damage), trouble near every rule's borders (tests/traffic.py), and
-that on CAN, Bluetooth and TCP (tests/traffic_wires.py), in captures of 50,000 packets each. In every Wireshark there is: this machine's own, and those that ``make matrix``
-fetched.
+that on CAN, Bluetooth and TCP (tests/traffic_wires.py), in captures of 50,000 packets each.
+
+In every Wireshark there is: this machine's own, and those that ``make matrix`` fetched.
 """
 
 from __future__ import annotations
@@ -90,7 +91,8 @@ def soak(tshark: Tshark, args: argparse.Namespace) -> int:
         for seed in itertools.count(args.seed):
             if records >= args.records:
                 break
-            wire = wires[seed % len(wires)]
+            turn: int = seed % len(wires)
+            wire = wires[turn]
             link_type, made = KINDS[wire](seed)
             path = Path(folder) / f"{wire}-{seed}.pcapng"
             count = min(args.packets, max(1000, args.records - records))
