@@ -15,7 +15,7 @@ class Place:
     """Where some bytes stand. Equal places are one series of payloads."""
 
     bus: str
-    """Its name, or the number of its interface."""
+    """Its name, the number of its interface, or the name of a TCP or Bluetooth connection."""
     board: int
     """0: the traffic does not say."""
     dialect: str

@@ -66,7 +66,7 @@ class Survey:
         frame = pending.popleft() if pending and pending[0].number == record.number else None
         self._moment(record.time_ns)
         self.kinds[record.kind.value] += 1
-        bus = self._bus(record.interface)
+        bus = record.connection or self._bus(record.interface)
         if record.kind is Kind.FOREIGN and frame is not None:
             self._take(*of_can(frame, bus), record.time_ns)
             return

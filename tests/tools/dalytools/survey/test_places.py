@@ -11,7 +11,10 @@ from tests.tools.dalytools.made import EPOCH_NS, a5, write
 
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
+from dalyref.decoder import Decoder
+from dalyref.packet import Packet
 from dalytools.cli import main
+from dalytools.survey.survey import Survey
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -105,6 +108,30 @@ def test_a_counter_in_byte_0_is_no_frame_number(tmp_path: Path) -> None:
         packets += [(poll / 20, a5(0x40, 0xE5)), (poll / 20 + 0.02, a5(1, 0xE5, bytes((poll,))))]
     places = surveyed(write(tmp_path / "fast.pcapng", packets), tmp_path)
     assert places["board 1 reply 0xE5"]["count"] == 30
+
+
+def test_two_connections_are_two_buses() -> None:
+    """Board 1 of the one serial server is not board 1 of the other."""
+    decoder, survey = Decoder(), Survey()
+    for number in range(20):
+        site = number % 2 + 1
+        packet = Packet(
+            number + 1,
+            number * 10**9,
+            a5(1, 0xE0, bytes((number // 2 * site,))),
+            transport="tcp",
+            connection=f"tcp {site}",
+            direction="inbound",
+        )
+        for record in decoder.feed(packet):
+            survey.add(record)
+    for record in decoder.finish():
+        survey.add(record)
+    survey.finish()
+    assert {place.bus: dict(stream.moves.stepped(0)) for place, stream in survey.streams.items()} == {
+        "tcp 1": {1: 9},
+        "tcp 2": {2: 9},
+    }
 
 
 def test_places_are_bounded(tmp_path: Path) -> None:
