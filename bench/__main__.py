@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from bench.table import Result
 
-NAMES = ("dissector", "reference", "bulk", "sniffer", "evidence", "replug", "files")
+NAMES = ("dissector", "wires", "reference", "bulk", "sniffer", "evidence", "replug", "files")
 
 
 def _positive(text: str) -> int:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from bench import poll_cycle
 from bench.child import Cost, wait
+from bench.modbus_crc import with_crc
 from bench.table import Goal, Result, spread
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
@@ -45,20 +46,10 @@ MODES = (
 )
 
 
-def _crc(data: bytes) -> bytes:
-    """Modbus CRC-16: polynomial A001, start FFFF, low byte first."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
-    return data + crc.to_bytes(2, "little")
-
-
 def _modbus(count: int) -> Iterator[tuple[int, bytes]]:
-    query = _crc(bytes.fromhex("010300000004"))
+    query = with_crc(bytes.fromhex("010300000004"))
     replies = [
-        _crc(b"\x01\x03\x08" + b"".join((3000 + n + k).to_bytes(2, "big") for k in range(4))) for n in range(256)
+        with_crc(b"\x01\x03\x08" + b"".join((3000 + n + k).to_bytes(2, "big") for k in range(4))) for n in range(256)
     ]
     for number in range(count):
         data = replies[number // 2 % 256] if number % 2 else query

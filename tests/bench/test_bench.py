@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import pytest
 from bench.table import Goal, Result, spread
 
-from bench import child, in_turn, poll_cycle
+from bench import child, in_turn, poll_cycle, wires
 from dalycapture.reader import read_capture
+from dalyref.decoder import decode
 from dalyref.records import Kind, split
+from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,6 +39,22 @@ def test_the_file_holds_a_packet_a_frame_all_good(tmp_path: Path) -> None:
     assert all(early.time_ns < late.time_ns for early, late in itertools.pairwise(packets))
     records = split(b"".join(packet.data for packet in packets))
     assert [record.kind for record in records] == [Kind.FRAME] * 500
+
+
+def test_the_other_wires_carry_values(tmp_path: Path) -> None:
+    can, modbus = tmp_path / "can.pcapng", tmp_path / "modbus.pcapng"
+    wires.write_can(can, 25)
+    wires.write_modbus(modbus, 4)
+    carriers = Carriers()
+    records = [
+        record.fields for record in decode(frame for packet in read_capture(can) for frame in carriers.of(packet))
+    ]
+    assert [fields["daly.transport"] for fields in records] == ["can"] * 25
+    assert sum("daly.cells.voltage" in fields for fields in records) == 1
+    replies = [record.fields for record in decode(read_capture(modbus))][1::2]
+    assert [fields["daly.cells.count"] for fields in replies] == [16, 16]
+    assert [fields["daly.soc"] for fields in replies] == [60, 60]
+    assert not any("daly.contradiction" in fields for fields in replies)
 
 
 def test_a_child_s_cost_is_its_own() -> None:
