@@ -76,11 +76,25 @@ function M.crc16(buf, first, last)
   if not xor then
     make_tables()
   end
-  local lo, hi = 255, 255
-  for i = first, last do
-    local index = xor[lo * 256 + byte(buf, i)]
-    lo = xor[hi * 256 + crc_lo[index]]
-    hi = crc_hi[index]
+  local lo, hi, index = 255, 255, nil
+  local xors, low, high = xor, crc_lo, crc_hi
+  local at = first
+  -- Four bytes a turn: taking each by a call of its own cost a third.
+  while at + 3 <= last do
+    local a, b, c, d = byte(buf, at, at + 3)
+    index = xors[lo * 256 + a]
+    lo, hi = xors[hi * 256 + low[index]], high[index]
+    index = xors[lo * 256 + b]
+    lo, hi = xors[hi * 256 + low[index]], high[index]
+    index = xors[lo * 256 + c]
+    lo, hi = xors[hi * 256 + low[index]], high[index]
+    index = xors[lo * 256 + d]
+    lo, hi = xors[hi * 256 + low[index]], high[index]
+    at = at + 4
+  end
+  for i = at, last do
+    index = xors[lo * 256 + byte(buf, i)]
+    lo, hi = xors[hi * 256 + low[index]], high[index]
   end
   return lo, hi
 end
