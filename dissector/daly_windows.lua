@@ -76,7 +76,8 @@ function M.crc16(buf, first, last)
   if not xor then
     make_tables()
   end
-  local lo, hi, index = 255, 255, nil
+  local lo, hi = 255, 255
+  local index
   local xors, low, high = xor, crc_lo, crc_hi
   local at = first
   -- Four bytes a turn: taking each by a call of its own cost a third.
