@@ -80,7 +80,7 @@ function M.crc16(buf, first, last)
   local index
   local xors, low, high = xor, crc_lo, crc_hi
   local at = first
-  -- Four bytes a turn: taking each by a call of its own cost a third.
+  -- Four bytes a turn: taking each by a call of its own cost a fifth more.
   while at + 3 <= last do
     local a, b, c, d = byte(buf, at, at + 3)
     index = xors[lo * 256 + a]
