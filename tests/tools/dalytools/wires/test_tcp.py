@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -27,7 +28,6 @@ from dalytools.wires.choice import Choice, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
 CHOICE = Choice(tcp_ports=numbers("8899"))
 ETHERNET, RAW_IP, USER0 = 1, 101, 147
@@ -231,6 +231,21 @@ def test_ports_that_are_none(ports: str, capsys: pytest.CaptureFixture[str]) -> 
     with pytest.raises(SystemExit):
         main(["decode", "x.pcapng", "--tcp-ports", ports])
     assert "is no list of numbers from 1 to 65535" in capsys.readouterr().err
+
+
+def test_the_commands_of_the_page_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """docs/can-bluetooth.md: one exchange on three wires, and a check of them."""
+    page = Path(__file__).parents[4] / "docs" / "can-bluetooth.md"
+    commands = [
+        line.split()[1:]
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if line.startswith(("    dalyshark simulate", "    dalyshark check --tcp-ports"))
+    ]
+    monkeypatch.chdir(tmp_path)
+    assert [main(command) for command in commands] == [0, 0, 0, 0]
+    assert "3 files" in capsys.readouterr().out
 
 
 def test_ports_and_handles() -> None:
