@@ -562,6 +562,14 @@ CASES: dict[str, list[Heard]] = {
                 "cells__voltage": [3300, 3300, 3300, 3269],
             },
         ),
+        # 10100 against 10000 is 1 % and no more
+        told(
+            changed(ALL_D2, (0x28, 101), *((cell, 2500) for cell in range(4))),
+            2,
+            0,
+            modbus__assumed=True,
+            also={**ALL_D2_SHOWN, "cell__voltage": [2500] * 4, "cells__voltage": [2500] * 4},
+        ),
     ],
     "81 proves itself": [
         told(ALL_81, 0, 0, address=0x51, modbus__assumed=True, also=ALL_81_SHOWN),
