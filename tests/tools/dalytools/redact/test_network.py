@@ -193,6 +193,7 @@ CODES = b"".join([a5(0x40, 0x57), *texts(0x57, CODE)] * 3)
             st.integers(0, 40),
             st.sampled_from((made.PUSH | made.ACK, made.SYN, made.RST | made.ACK)),
         ),
+        min_size=1,
         max_size=30,
     )
 )
