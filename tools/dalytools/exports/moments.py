@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from dalyref.kinds import Kind
-from dalytools.exports.schema import FIELDS, FILE, INTERFACE, NUMBER, TIME, Column
+from dalytools.exports.schema import CONNECTION, FIELDS, FILE, INTERFACE, NUMBER, TIME, Column
 from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _MOST_CLOSED = 65536
 
 
 def _choices() -> tuple[Column, ...]:
-    made: list[Column] = []
+    made: list[Column] = [CONNECTION]
     for column in FIELDS:
         if column.field == SENSORS:
             made += [
@@ -48,7 +48,7 @@ def _choices() -> tuple[Column, ...]:
 
 
 CHOICES: Final = _choices()
-"""Quantities of a battery. Cells and sensors have a column each."""
+"""Quantities of a battery, and where it was heard. Cells and sensors have a column each."""
 
 
 @dataclass(slots=True)
@@ -59,8 +59,8 @@ class _Open:
     row: Row
 
 
-_Key = tuple[int, object, object, object]
-"""Interface, transport, dialect, board."""
+_Key = tuple[int, object, str, object, object]
+"""Interface, transport, connection, dialect, board."""
 
 
 class Moments:
@@ -68,8 +68,9 @@ class Moments:
 
     def __init__(self, chosen: Sequence[Column] = CHOICES, *, span_ns: int) -> None:
         self.columns: Sequence[Column] = (*HEAD, *chosen)
-        self._by_field = {column.field: column for column in chosen if column.field != SENSORS}
+        self._by_field = {column.field: column for column in chosen if column.field and column.field != SENSORS}
         self._sensors = {column.name for column in chosen if column.field == SENSORS}
+        self._connection = CONNECTION in chosen
         self._span_ns = span_ns
         self._open: dict[_Key, _Open] = {}  # the one that began first comes first
         self._closed: list[tuple[int, int, Row]] = []  # heap, by beginning and order
@@ -84,7 +85,13 @@ class Moments:
         if not values:
             return []
         self._close_old(record.time_ns)
-        key = (record.interface, record.transport, fields.get("daly.dialect"), fields.get("daly.board"))
+        key = (
+            record.interface,
+            record.transport,
+            record.connection,
+            fields.get("daly.dialect"),
+            fields.get("daly.board"),
+        )
         present = self._open.get(key)
         if present is not None and not present.row.keys().isdisjoint(values):
             self._close(key)
@@ -100,6 +107,8 @@ class Moments:
             board = fields.get("daly.board")
             if isinstance(board, int):
                 head["board"] = board
+            if record.connection and self._connection:
+                head[CONNECTION.name] = plain(record.connection)
             present = self._open[key] = _Open(record.time_ns, head)
             if len(self._open) > _MOST_OPEN:
                 self._close(next(iter(self._open)))

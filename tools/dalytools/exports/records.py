@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dalytools.exports.schema import COMMENT, FIELDS, FILE, INTERFACE, NUMBER, RECORD_COLUMNS, TIME
+from dalytools.exports.schema import COMMENT, CONNECTION, FIELDS, FILE, INTERFACE, NUMBER, RECORD_COLUMNS, TIME
 from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dalytools.exports.schema import Column
 
 HEAD = (FILE, NUMBER, TIME, INTERFACE)
-CHOICES = (*FIELDS, COMMENT)
+CHOICES = (*FIELDS, COMMENT, CONNECTION)
 DEFAULT = RECORD_COLUMNS[len(HEAD) :]
 
 
@@ -30,6 +30,7 @@ class Records:
         self._by_field = {column.field: column for column in chosen if column.field}
         self._file = ("", "")
         self._comment = COMMENT in chosen
+        self._connection = CONNECTION in chosen
         self._only_with = only_with
 
     def take(self, file: str, record: Decoded) -> Sequence[Row]:
@@ -51,6 +52,8 @@ class Records:
                 row[column.name] = value
         if self._comment and record.comment:
             row[COMMENT.name] = plain(record.comment)
+        if self._connection and record.connection:
+            row[CONNECTION.name] = plain(record.connection)
         return () if self._only_with and len(row) == heads else (row,)
 
     def end_file(self) -> Sequence[Row]:

@@ -32,7 +32,7 @@ class Column:
     type: Type
     unit: str = ""
     field: str = ""
-    """As the dissector names it; empty of what is no field: file, number, time, interface, comment."""
+    """As the dissector names it; empty of what is no field: file, number, time, interface, comment, connection."""
     several: bool = False
     """A list: the field may occur more than once in a record."""
     words: Mapping[int, str] | None = None
@@ -225,6 +225,8 @@ INTERFACE: Final = Column("interface", "int32")
 """Of the capture, from 0."""
 COMMENT: Final = Column("comment", "text")
 """The packet's comment: of an event, what happened."""
+CONNECTION: Final = Column("connection", "text")
+"""Of Bluetooth and TCP: which; each is a bus of its own."""
 
 FIELDS: Final = _columns()
 """A column a field, in the order of ``field_names``."""
@@ -235,5 +237,6 @@ RECORD_COLUMNS: Final = (
     INTERFACE,
     *(column for column in FIELDS if not column.field.removeprefix("daly.cell.").isdecimal()),
     COMMENT,
+    CONNECTION,
 )
 """A row a record. Single cells stand in the list ``cells_voltage_mV``."""

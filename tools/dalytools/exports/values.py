@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dalytools.exports.schema import FIELDS, FILE, INTERFACE, NUMBER, TIME, Column
+from dalytools.exports.schema import CONNECTION, FIELDS, FILE, INTERFACE, NUMBER, TIME, Column
 from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ PART: Final = Column("part", "int32")
 VALUE: Final = Column("value", "double")
 TEXT: Final = Column("text", "text")
 UNIT: Final = Column("unit", "text")
-COLUMNS: Final = (FILE, NUMBER, TIME, INTERFACE, *_OF_RECORD, FIELD, PART, VALUE, TEXT, UNIT)
+COLUMNS: Final = (FILE, NUMBER, TIME, INTERFACE, *_OF_RECORD, FIELD, PART, VALUE, TEXT, UNIT, CONNECTION)
 
 CHOICES: Final = tuple(column for column in FIELDS if column not in _OF_RECORD)
 DEFAULT: Final = tuple(
@@ -52,6 +52,8 @@ class Values:
             TIME.name: record.time_ns,
             INTERFACE.name: record.interface,
         }
+        if record.connection:
+            head[CONNECTION.name] = plain(record.connection)
         for column in _OF_RECORD:
             if (sent := record.fields.get(column.field)) is not None and (value := column.values(sent)) is not None:
                 head[column.name] = value

@@ -11,7 +11,10 @@ import pytest
 from tests.tools.dalytools.exports.sessions import CELLS, TOLD, ask_and_answer, decode, poll, table
 from tests.tools.dalytools.made import ANSWER, ASK, a5, write
 
+from dalyref.decoder import decode as decode_records
+from dalyref.packet import Packet
 from dalytools.exports.csv_file import CsvFile, safe, time_text
+from dalytools.exports.moments import Moments
 from dalytools.exports.schema import FIELDS, TIME
 
 if TYPE_CHECKING:
@@ -67,6 +70,19 @@ def test_boards_have_rows_of_their_own_in_the_order_of_time(tmp_path: Path) -> N
         ("4", "2"),
         ("5", "1"),
     ]
+
+
+def test_two_connections_on_one_interface_are_two_packs() -> None:
+    """Both say board 1; the second's reply is between two of the first's."""
+    mos = a5(1, 0x93, bytes.fromhex("0201000000000000"))
+    packets = [
+        Packet(1, 0, ANSWER, transport="tcp", connection="a", direction="inbound"),
+        Packet(2, 10**9, mos, transport="tcp", connection="b", direction="inbound"),
+    ]
+    shape = Moments(span_ns=10**10)
+    rows = [row for record in decode_records(packets) for row in shape.take("f", record)] + shape.end_file()
+    told = [(row["connection"], row.get("pack_voltage_V"), row.get("state")) for row in rows]
+    assert told == [("a", 24.8, None), ("b", None, "discharging")]
 
 
 def test_damaged_records_and_requests_are_no_values(tmp_path: Path) -> None:
