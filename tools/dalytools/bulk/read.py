@@ -13,7 +13,7 @@ from dalytools.bulk.lots import Decoder
 from dalytools.bulk.packets import Interfaces
 from dalytools.bulk.reading import read_columns
 from dalytools.bulk.records import Cutter
-from dalytools.bulk.unlike import NotSerialError, UnlikeError
+from dalytools.bulk.unlike import NotSerialError, OtherMediumError, UnlikeError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,7 @@ def read(path: Path | str, options: Options | None = None, *, chunk: int = CHUNK
             problem = error
         yield decoder.finish(cutter.finish())
     except NotSerialError as error:
-        raise CaptureError(f"{path}: {error}; read it with: dalyshark decode") from None
+        raise OtherMediumError(f"{path}: {error}; read it with: dalyshark decode") from None
     except UnlikeError as error:
         if str(path) == "-":
             message = f"standard input has {error}, and can not be read a second time; give a file"

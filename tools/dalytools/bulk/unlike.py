@@ -3,9 +3,15 @@
 
 from __future__ import annotations
 
+from dalycapture.errors import CaptureError
+
 
 class UnlikeError(Exception):
     """A capture has what only the plain decoder decides; said in a few words."""
+
+
+class OtherMediumError(CaptureError):
+    """The same, said to whoever reads a capture in bulk: one line."""
 
 
 class NotSerialError(UnlikeError):

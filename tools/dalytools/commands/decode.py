@@ -16,12 +16,12 @@ from dalycapture.linktype import link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
 from dalytools import time_range, wire_times
-from dalytools.exports import export
+from dalytools.exports import bulk_choice, export, records
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
 from dalytools.record_lines import line
 from dalytools.terminal_text import plain
-from dalytools.whole_file import whole_file
+from dalytools.whole_file import whole_binary_file, whole_file
 from dalytools.wires import choice
 from dalytools.wires.carriers import NOT_READ, Carriers
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from dalyref.values import Fields
     from dalytools.exports.export import Plan
+    from dalytools.exports.schema import Column
     from dalytools.time_range import TimeRange
     from dalytools.wires.choice import Choice
 
@@ -80,6 +81,9 @@ def run(args: argparse.Namespace) -> int:
     plan = export.read(args)
     span = time_range.read(args)
     problems: list[str] = []
+    columns = bulk_choice.chosen(plan, span, files)
+    if columns is not None and (status := _in_bulk(files, output, columns, plan, options)) is not None:
+        return status
     with _opened(plan, output, options, several=len(files) > 1) as out:
         shown = 0
         for name in files:
@@ -90,6 +94,55 @@ def run(args: argparse.Namespace) -> int:
                 print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
         if problems and not shown and output != "-":
             raise Problem(f"nothing could be read, so {output} was not written")
+    return 2 if problems else 0
+
+
+def _in_bulk(files: list[str], output: str, columns: list[Column], plan: Plan, options: Options) -> int | None:
+    """Write the table the quick way; return the exit status, or None where the plain way must do it."""
+    from dalytools.bulk.read import read
+    from dalytools.bulk.unlike import OtherMediumError
+    from dalytools.exports.arrow_schema import arrow_schema
+    from dalytools.exports.bulk_parquet import Rows
+    from dalytools.exports.parquet_file import ParquetFile
+
+    everything = (*records.HEAD, *columns)
+    schema = arrow_schema(everything)
+    names = {column.name for column in everything}
+    if plan.labels or len(names) < len(everything):
+        return None
+    problems: list[str] = []
+    shown = 0
+    try:
+        with whole_binary_file(output) as raw:
+            table = ParquetFile(raw, everything)
+            try:
+                for name in files:
+                    rows = Rows(plain(name), columns, schema)
+                    said = shown
+                    with progress_bar(f"decode {plain(Path(name).name)}") as advance:
+                        try:
+                            for batch in read(name, options):
+                                shown += len(batch.records)
+                                advance(shown)
+                                if (some := rows.take(batch)) is not None:
+                                    table.put_table(some)
+                        except OtherMediumError:
+                            raise
+                        except CaptureError as error:
+                            problems.append(str(error))
+                    if (some := rows.finish()) is not None:
+                        table.put_table(some)
+                    if shown == said and not problems:
+                        raise OtherMediumError(name)  # the plain way says what is in it
+                for problem in problems:
+                    print(f"dalyshark decode: {plain(problem)}", file=sys.stderr)  # noqa: T201
+                if problems and not shown:
+                    raise Problem(f"nothing could be read, so {output} was not written")
+                table.close()
+            finally:
+                table.abandon()
+    except OtherMediumError:
+        return None
     return 2 if problems else 0
 
 

@@ -89,6 +89,14 @@ class ParquetFile:
             if self._rows >= GROUP_ROWS:
                 self.flush()
 
+    def put_table(self, table: pa.Table) -> None:
+        """Take rows that are columns already."""
+        self.pack()
+        self._waiting.append(table)
+        self._rows += table.num_rows
+        if self._rows >= GROUP_ROWS:
+            self.flush()
+
     def pack(self) -> None:
         """Turn rows held as Python objects to Arrow columns, which are smaller."""
         if self._batch.rows:
