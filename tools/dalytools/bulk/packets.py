@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dalycapture.errors import CaptureError
 from dalyref.packet import Packet
 
 if TYPE_CHECKING:
@@ -80,9 +79,7 @@ class Gathered:
     length: list[int] = field(default_factory=list[int])
 
     def add(self, packet: Packet, offset: int) -> None:
-        """Take a packet whose data will stand at `offset`. Raises CaptureError for a time that no column can hold."""
-        if packet.time_ns >= 1 << 63:
-            raise CaptureError(f"packet {packet.number}: its time stamp is after the year 2261")
+        """Take a packet whose data will stand at `offset`."""
         self.number.append(packet.number)
         self.time_ns.append(packet.time_ns)
         self.interface.append(packet.interface)

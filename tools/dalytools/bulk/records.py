@@ -40,6 +40,8 @@ DIALECTS: Final = (None, Dialect.A5, Dialect.D2, Dialect.P81)
 """What a number in the column `dialect` means."""
 _A5: Final = 1
 _MOST_INTERFACES: Final = 1000
+_LATEST_NS: Final = 1 << 62
+"""Sums of later times and of what something lasts may not fit a column."""
 
 
 @dataclass(slots=True)
@@ -105,6 +107,8 @@ class Cutter:
         serial = np.array([link_type in SERIAL_LINK_TYPES for link_type in known], np.bool_)
         if not serial.all() and not serial[packets.interface].all():
             raise NotSerialError("holds packets that are not of a serial line")
+        if len(packets) and packets.time_ns.max() >= _LATEST_NS:
+            raise UnlikeError("times after the year 2116")
         if len(known) > _MOST_INTERFACES:
             raise UnlikeError("more than a thousand interfaces")
 
