@@ -2,7 +2,7 @@
 """``make fuzz``: a million packets of mutated samples through the dissector, in every Wireshark that is there.
 
     mutations    bits flipped, bytes cut, two samples spliced, lengths changed, packets snapped short, random bytes
-    carriers     USER0 packets; the same in TCP segments of a serial server
+    carriers     USER0 packets; the same in TCP segments of a serial server; CAN and Bluetooth (tests/traffic_wires.py)
 
 No Lua error, no abort, no hang may come of it. The tsharks: this machine's own, and those that ``make matrix`` fetched.
 """
@@ -10,6 +10,7 @@ No Lua error, no abort, no hang may come of it. The tsharks: this machine's own,
 from __future__ import annotations
 
 import argparse
+import itertools
 import random
 import subprocess
 import sys
@@ -17,6 +18,8 @@ import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from tests import traffic_wires
 
 from bench import wiresharks
 from dalycapture.create import open_writer
@@ -34,7 +37,10 @@ SAMPLES = sorted(ROOT.joinpath("pcap_samples").glob("*.pcap*"))
 PACKETS_A_FILE = 50_000
 LONGEST_S = 600
 EPOCH_NS = 1_700_000_000_000_000_000
-RAW_IP = 101
+LINK_TYPES = {"user0": 147, "tcp": 101, "can": 227, "ble": 201}
+TURNS = ("user0", "can", "user0", "user0", "tcp", "ble", "user0")
+WIRE_PACKETS = 1000
+SHORTEST = 8  # bytes of a CAN or HCI packet that Wireshark does not refuse with the whole file
 
 WAYS = (("-T", "fields"), ("-2", "-T", "fields"), ("-V",), ())
 """How a file is looked at, in turn: all fields, two passes, the whole tree as text, the packet list."""
@@ -83,27 +89,32 @@ def tcp(r: random.Random, payload: bytes, sequence: int) -> bytes:
     return bytes((0x45, 0)) + total.to_bytes(2, "big") + bytes((0, 1, 0, 0, 64, 6, 0, 0)) + addresses + segment
 
 
-def packets(seed: int, count: int, *, in_tcp: bool) -> Iterator[bytes]:
+def packets(seed: int, count: int, carrier: str) -> Iterator[bytes]:
     """Yield mutated packets; the same for the same seed."""
-    r, known = random.Random(seed), corpus()
+    r = random.Random(seed)
+    made = {"can": traffic_wires.can, "ble": traffic_wires.ble}.get(carrier)
+    known = [packet.data for packet in itertools.islice(made(seed), WIRE_PACKETS)] if made else corpus()
     sequence = 1
     for _ in range(count):
         data = mutate(r, known)
-        if not in_tcp:
-            yield data
+        if made and r.random() < 0.5:  # good ones between, without which nothing is known of a bus
+            yield r.choice(known)
+            continue
+        if carrier != "tcp":
+            yield data.ljust(SHORTEST, b"\0") if made else data
             continue
         yield tcp(r, data, sequence)
         if r.random() < 0.95:  # else: sent again, or lost
             sequence = (sequence + len(data) * r.choice((1, 1, 1, 1, 2))) & 0xFFFFFFFF
 
 
-def write(path: Path, seed: int, count: int, *, in_tcp: bool = False) -> None:
+def write(path: Path, seed: int, count: int, carrier: str = "user0") -> None:
     """Write a file of mutated packets, at times near the rules' limits."""
     r = random.Random(seed + 1)
     now = EPOCH_NS
     with open_writer(path) as writer:
-        writer.add_interface(Interface("fuzz", "dalyshark bus=fuzz", RAW_IP if in_tcp else 147))
-        for data in packets(seed, count, in_tcp=in_tcp):
+        writer.add_interface(Interface("fuzz", "dalyshark bus=fuzz", LINK_TYPES[carrier]))
+        for data in packets(seed, count, carrier):
             now += r.choice((0, 1, 14, 40, 260, 600, 1100)) * 1_000_000
             writer.write_packet(now, data, flags=r.choice((0, 0, 0, 1, 2)))
 
@@ -139,10 +150,10 @@ def fuzz(tshark: Tshark, count: int, seed: int) -> list[str]:
     while done < count:
         size = min(PACKETS_A_FILE, count - done)
         path = tshark.home / "fuzz.pcapng"
-        in_tcp = turn % 5 == 4
-        write(path, seed + turn, size, in_tcp=in_tcp)
+        carrier = TURNS[turn % len(TURNS)]
+        write(path, seed + turn, size, carrier)
         path.chmod(0o644)
-        if turn % 5 == 3:
+        if turn % len(TURNS) == 3:
             path = snapped(tshark, path)
         way = WAYS[turn % len(WAYS)]
         said = look(tshark, path, way)

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 @pytest.mark.parametrize("way", fuzz.WAYS, ids=lambda way: " ".join(way) or "list")
-@pytest.mark.parametrize("in_tcp", [False, True], ids=["user0", "tcp"])
-def test_mutated_samples_raise_nothing(tshark: Tshark, way: tuple[str, ...], in_tcp: bool) -> None:
+@pytest.mark.parametrize("carrier", list(fuzz.LINK_TYPES))
+def test_mutated_samples_raise_nothing(tshark: Tshark, way: tuple[str, ...], carrier: str) -> None:
     path = tshark.home / "fuzz.pcapng"
-    fuzz.write(path, 77, 2000, in_tcp=in_tcp)
+    fuzz.write(path, 77, 2000, carrier)
     path.chmod(0o644)
     assert fuzz.look(tshark, path, way) == ""
 
