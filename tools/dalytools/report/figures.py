@@ -190,7 +190,7 @@ def _line_of(rows: _Rows, name: str, series: Series, unit: str) -> list[Trace]:
     times, values = series.points()
     return [
         {
-            "type": "scattergl" if len(values) > 5000 else "scatter",
+            "type": "scatter",  # not scattergl: a remote desktop has no WebGL, and shows nothing
             "mode": "lines" if len(values) > 1 else "markers",
             "name": name,
             "x": rows.times(times),
