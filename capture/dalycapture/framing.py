@@ -23,7 +23,8 @@ BITS_PER_BYTE: Final = 10  # 8N1: start, eight data, stop
 SILENCE_NS: Final = 250_000_000
 A5_START: Final = 0xA5
 A5_SIZE: Final = 13
-KNOWN_NS: Final = 1_000_000  # a start that is known so well gets no better by watching every byte
+KNOWN_NS: Final = 1_000_000  # a start that is known so well gets no better by watching every byte;
+KNOWN_BYTES: Final = 2  # nor so well, in byte times: two reads pin it to one, and those that follow do no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,7 @@ class Framer:
         self._ahead = b""  # not yet shown to the splitter
         self._byte_ns = bits_per_byte * 1_000_000_000 / baud
         self._silence_ns = silence_ns
+        self._known_ns = max(KNOWN_NS, round(KNOWN_BYTES * self._byte_ns))
         self.timing = Timing(self._byte_ns, latency)
 
     @property
@@ -110,7 +112,7 @@ class Framer:
         if not self._ahead or self._ahead[0] != A5_START or self._splitter.pending:
             return 0
         lowest, highest = self.timing.so_far()
-        if not 0 <= highest - lowest <= KNOWN_NS:
+        if not 0 <= highest - lowest <= self._known_ns:
             return 0
         return highest + round((A5_SIZE - 1) * self._byte_ns)
 

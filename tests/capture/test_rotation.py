@@ -135,7 +135,7 @@ def test_by_the_clock(tmp_path: Path) -> None:
     with series(tmp_path, interval=2) as writer:
         writer.add_interface(tap("a"))
         wait = writer.due - time.monotonic()
-        assert 0 <= wait <= 2
+        assert -1 < wait <= 2  # below 0: this test was held up, and it is due
         assert (time.time() + wait + 1e-3) % 2 < 0.05 or wait < 0.01
 
 

@@ -124,6 +124,11 @@ def test_a_frame_whose_start_is_known_need_not_be_watched() -> None:
     slow = Framer(10_000, latency=Latency(16, 1, "given"))
     slow.feed(FRAME[:1], 101 * MS, MS // 10)
     assert slow.rest_until_ns() == 0  # every read tells more
+    split = Framer(10_000, latency=Latency(16, 0, "given"))
+    split.feed(FRAME[:1], 101 * MS, MS // 10)
+    assert split.rest_until_ns() == 0
+    split.feed(FRAME[1:2], 102 * MS, MS // 10)
+    assert split.rest_until_ns() == 112 * MS  # two reads pin it to a byte time, and the third does no more
     junk = Framer(10_000, latency=PROMPT)
     junk.feed(b"\xff", 101 * MS, MS // 10)
     assert junk.rest_until_ns() == 0
