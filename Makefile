@@ -53,6 +53,7 @@ bench: ## speed and memory, beside named peers
 samples: ## make pcap_samples/ again
 	$(DEV_SETUP)
 	@$(PY) pcap_samples/make_samples.py
+	@$(PY) pcap_samples/make_wire_samples.py
 
 docs: ## write docs/fields.md and the outputs in docs/statistics.md again
 	$(DEV_SETUP)

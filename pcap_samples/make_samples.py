@@ -387,6 +387,7 @@ def table() -> str:
         "Made by `make_samples.py`; do not edit. `real-*` hold bytes of real devices (from `real-frames.jsonl`,",
         "where each names its source); their times are made: 37 ms from request to reply, bursts back to back.",
         "`made-*` come from the simulated bus, or say what else was made. Counts are what was put in, counted by hand.",
+        "CAN, Bluetooth, TCP, and all wires in one file: [wires](wires/README.md).",
         "",
         "| capture | what to look at | records | origin | link type |",
         "|---|---|---|---|---|",
