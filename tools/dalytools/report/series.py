@@ -66,7 +66,8 @@ class Series:
         for at in range(0, len(pieces), _WORDS):
             some = {(pieces[at + i], pieces[at + i + 1]) for i in (3, 5)}
             first, last = (pieces[at + 1], pieces[at + 2]), (pieces[at + 7], pieces[at + 8])
-            for time, value in (first, *sorted(some - {first, last}), *([last] if last != first else [])):
+            between = sorted(some - {first, last})
+            for time, value in (first, *between, *([last] if between or last != first else [])):
                 times.append(time)
                 values.append(value)
         return times, values

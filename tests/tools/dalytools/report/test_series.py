@@ -45,6 +45,13 @@ def test_a_short_series_is_shown_as_it_is() -> None:
     assert series.points() == ([0.0, 1.0, 2.0], [1.0, 5.0, 2.0])
 
 
+def test_a_value_that_comes_back_at_once_is_the_last_one_too() -> None:
+    series = Series()
+    for value in (1.0, 0.0, 1.0):
+        series.add(0.0, value)
+    assert series.points() == ([0.0, 0.0, 0.0], [1.0, 0.0, 1.0])
+
+
 def test_counts_lose_nothing_when_columns_are_joined() -> None:
     counts = Counts(most=4)
     for second in range(1000):
