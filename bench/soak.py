@@ -69,6 +69,7 @@ KINDS: dict[str, Callable[[int], tuple[int, Iterator[Made]]]] = {
     "ble": lambda seed: on_wire(traffic_wires.HCI_WITH_DIRECTION, traffic_wires.ble(seed)),
     "tcp": lambda seed: on_wire(traffic_wires.RAW_IP, traffic_wires.tcp(seed)),
     "lossy-tcp": lambda seed: on_wire(traffic_wires.RAW_IP, traffic_wires.lossy_tcp(seed)),
+    "lossy-tcp-again": lambda seed: on_wire(traffic_wires.RAW_IP, traffic_wires.lossy_tcp_again(seed)),
 }
 
 

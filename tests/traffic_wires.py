@@ -42,9 +42,8 @@ def segment(side: int, connection: int, sequence: int, data: bytes) -> bytes:
     return ip + head + data
 
 
-def tcp(seed: int, *, lossy: bool = False) -> Iterator[OnWire]:
-    """Yield segments of four connections. lossy: some never come, and none change places or come again: Wireshark 4.4
-    then shows frames some packets late (docs/wires.md 4)."""
+def tcp(seed: int, *, lossy: bool = False, again: bool = True) -> Iterator[OnWire]:
+    """Yield segments of four connections. lossy: some never come, and none change places; again: some come twice."""
     r = random.Random(seed)
     following: dict[tuple[int, int], int] = {}
     kept: tuple[tuple[int, int], bytes] | None = None
@@ -65,7 +64,7 @@ def tcp(seed: int, *, lossy: bool = False) -> Iterator[OnWire]:
             kept = (key, packet)
             continue
         yield OnWire(made.time_ns, packet)
-        if not lossy and luck > 0.98:
+        if again and luck > 0.98:
             yield OnWire(made.time_ns + 1000, packet)
         if kept is not None:
             yield OnWire(made.time_ns + 2000, kept[1])
@@ -74,6 +73,11 @@ def tcp(seed: int, *, lossy: bool = False) -> Iterator[OnWire]:
 
 def lossy_tcp(seed: int) -> Iterator[OnWire]:
     """Yield segments some of which never come."""
+    return tcp(seed, lossy=True, again=False)
+
+
+def lossy_tcp_again(seed: int) -> Iterator[OnWire]:
+    """Yield segments some of which never come, and some twice: not every Wireshark can show these (docs/wires.md 4)."""
     return tcp(seed, lossy=True)
 
 

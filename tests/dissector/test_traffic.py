@@ -33,7 +33,7 @@ def test_both_readings_agree(tshark: Tshark, make: Callable[[int], Iterator[Made
         assert min(result.kinds[kind] for kind in ("bad_checksum", "short", "junk", "foreign", "event")) > 5
 
 
-@pytest.mark.parametrize("kind", ["can", "ble", "tcp", "lossy-tcp"])
+@pytest.mark.parametrize("kind", ["can", "ble", "tcp", "lossy-tcp", "lossy-tcp-again"])
 def test_both_readings_agree_on_every_wire(tshark: Tshark, kind: str) -> None:
     link_type, made = KINDS[kind](104)
     path = tshark.home / f"{kind}.pcapng"
@@ -41,6 +41,9 @@ def test_both_readings_agree_on_every_wire(tshark: Tshark, kind: str) -> None:
     path.chmod(0o644)
     result = compare(tshark, path, wires=WIRES)
     assert [str(difference) for difference in result.differences[:5]] == []
+    if kind == "lossy-tcp-again" and not tshark.version.startswith("4.0."):
+        assert result.left_out > 0
+        return
     assert result.left_out == 0
     assert result.kinds["frame"] > 1500
     assert result.kinds["foreign"] > 20

@@ -229,7 +229,8 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
         everything, asked.severity, asked.ignored, known.keys if known is not None else ()
     )
     if result.left_out:
-        said = f"{plain(name)}: {counted(result.left_out, 'TCP connection')} with lost and late segments not compared"
+        left_out = counted(result.left_out, "TCP connection")
+        said = f"{plain(name)}: segments are lost; {left_out} with late or repeated ones not compared"
         print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201
     if result.broken:
         said = plain(f"{result.broken}; compared what is there")

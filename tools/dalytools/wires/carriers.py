@@ -40,9 +40,14 @@ class Carriers:
         return self._tcp is not None and self._tcp.lost
 
     @property
-    def mixed(self) -> set[str]:
-        """TCP connections with bytes missing and with segments out of order, by name."""
-        return self._tcp.mixed if self._tcp is not None else set()
+    def late(self) -> set[str]:
+        """TCP connections with segments out of order, by name."""
+        return self._tcp.late if self._tcp is not None else set()
+
+    @property
+    def again(self) -> set[str]:
+        """TCP connections with segments that came twice, by name."""
+        return self._tcp.again if self._tcp is not None else set()
 
     @property
     def connection(self) -> str:

@@ -63,10 +63,6 @@ class Connection:
 
     name: str
     sides: tuple[_Side, _Side] = field(default_factory=lambda: (_Side(), _Side()))
-    lost: bool = False
-    """Bytes are missing for good."""
-    late: bool = False
-    """Segments came out of order, or with old bytes and new ones."""
 
 
 class Tcp:
@@ -77,8 +73,10 @@ class Tcp:
         self._connections: dict[tuple[tuple[str, int], tuple[str, int]], Connection] = {}
         self._gaps: dict[tuple[str, int], Connection] = {}  # open ones, by the connection's name and side
         self._names = 0
-        self.mixed: set[str] = set()
-        """Connections, by name, with bytes missing and with segments out of order."""
+        self.late: set[str] = set()
+        """Connections, by name, with segments out of order, or with old bytes and new ones."""
+        self.again: set[str] = set()
+        """Connections, by name, with segments that brought what had come before."""
         self.latest = ""
         """The connection of the latest segment."""
         self.lost = False
@@ -144,9 +142,11 @@ class Tcp:
             side.base, side.next = segment.sequence, sequence
         length = len(segment.data) + segment.missing
         if segment.flags & RST or length <= -_behind(sequence, side.next):
+            if segment.data:
+                self.again.add(connection.name)
             return  # nothing in it, or nothing new
         if _behind(sequence, side.next) < 0:
-            connection.late = True
+            self.late.add(connection.name)
         self._wait(connection, side, _Waiting(sequence, segment.data, segment.missing, packet))
         if _behind(side.waiting[0].sequence, side.next) <= 0:
             self._drain(connection, which, packet, out)
@@ -156,19 +156,17 @@ class Tcp:
             self._gaps[connection.name, which] = connection
         else:
             self._gaps.pop((connection.name, which), None)
-        if connection.lost and connection.late:
-            self.mixed.add(connection.name)
 
-    @staticmethod
-    def _wait(connection: Connection, side: _Side, one: _Waiting) -> None:
+    def _wait(self, connection: Connection, side: _Side, one: _Waiting) -> None:
         """Put a segment in its place by sequence numbers."""
         at = len(side.waiting)
         while at and _behind(side.waiting[at - 1].sequence, one.sequence) > 0:
             at -= 1
         if at and side.waiting[at - 1].sequence == one.sequence and len(side.waiting[at - 1].data) >= len(one.data):
+            self.again.add(connection.name)
             return  # it has come before
         if at < len(side.waiting):
-            connection.late = True
+            self.late.add(connection.name)
         side.waiting.insert(at, one)
         side.held += len(one.data)
 
@@ -176,15 +174,13 @@ class Tcp:
         """Give a gap up: what follows it, up to the next one, is handed over by packets of its own."""
         side = connection.sides[which]
         side.next = side.waiting[0].sequence
-        self._miss(connection, side)
+        self._miss(side)
         self._drain(connection, which, None, out)
         if not side.waiting:
             self._gaps.pop((connection.name, which), None)
 
-    def _miss(self, connection: Connection, side: _Side) -> None:
-        side.lost = connection.lost = self.lost = True
-        if connection.late:
-            self.mixed.add(connection.name)
+    def _miss(self, side: _Side) -> None:
+        side.lost = self.lost = True
 
     def _drain(self, connection: Connection, which: int, packet: Packet | None, out: list[Packet]) -> None:
         """Hand over what is in order. packet: that all of it counts to; None: the latest that it came in."""
@@ -227,6 +223,6 @@ class Tcp:
             if one.missing and latest is not None:
                 hand(latest)
                 run = b""
-                self._miss(connection, side)
+                self._miss(side)
         if latest is not None:
             hand(latest)
