@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from dalycapture.errors import CaptureError, reason
-from dalycapture.output import open_output, open_pipe, refuse_other_files
+from dalycapture.output import beside, open_output, open_pipe
 from dalycapture.pcap import PcapWriter
 from dalycapture.pcapng import PcapngWriter
 from dalycapture.rotation import FileSeries, Keeping, Rotation
@@ -63,16 +63,15 @@ def new_capture(
         with open_writer(path, file_format, application=application) as writer:
             yield writer
         return
-    refuse_other_files(place)
-    beside = place.with_name(f".{place.name}.{os.getpid()}.part")
+    new = beside(place)
     try:
-        with open_writer(beside, file_format, application=application) as writer:
+        with open_writer(new, file_format, application=application) as writer:
             yield writer
-        beside.replace(place)
+        new.replace(place)
     except OSError as error:
         raise CaptureError(f"{path} can not be written: {reason(error)}") from None
     finally:
-        beside.unlink(missing_ok=True)
+        new.unlink(missing_ok=True)
 
 
 def _output(path: Path | str, file_format: str, keeping: Keeping) -> Output:

@@ -358,6 +358,16 @@ def refuse_other_files(path: Path) -> None:
         raise CaptureError(f"{path} is there and is not a capture file, so it is not overwritten; choose another name")
 
 
+def beside(place: Path) -> Path:
+    """Name a file beside `place`, which takes its name when it is whole. Raises CaptureError where none can be made."""
+    refuse_other_files(place)
+    if not place.parent.is_dir():
+        raise CaptureError(_cannot_write(place, FileNotFoundError()))
+    if not os.access(place.parent, os.W_OK):
+        raise CaptureError(_cannot_write(place, PermissionError()))
+    return place.with_name(f".{place.name}.{os.getpid()}.part")
+
+
 def _cannot_write(path: Path | str, error: OSError) -> str:
     folder = Path(path).parent
     if isinstance(error, IsADirectoryError):

@@ -12,6 +12,7 @@ from dalycapture.errors import CaptureError
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoder
 from dalytools import wire_times
+from dalytools.extra import missing
 from dalytools.findings.limits import Limits
 from dalytools.findings.search import Search
 from dalytools.problem import Problem
@@ -98,5 +99,5 @@ def _library() -> str:
     try:
         from plotly.offline import get_plotlyjs
     except ImportError:
-        raise Problem("plots need the package plotly: type  pip install 'dalyshark[report]'") from None
+        raise missing("plots need", "plotly", "report") from None
     return str(get_plotlyjs())

@@ -20,6 +20,7 @@ from dalytools.exports.csv_file import CsvFile
 from dalytools.exports.csv_sparse import SparseCsvFile
 from dalytools.exports.fingerprint import Fingerprint
 from dalytools.exports.schema import FIELDS, Column
+from dalytools.extra import missing
 from dalytools.problem import Problem
 from dalytools.whole_file import whole_binary_file, whole_file
 
@@ -100,7 +101,7 @@ def read(args: argparse.Namespace) -> Plan:
             raise Problem("--fields is for tables and objects: say --format csv, parquet or jsonl")
     elif plan.format == "parquet":
         if importlib.util.find_spec("pyarrow") is None:
-            raise Problem("Parquet needs the package pyarrow: type  pip install 'dalyshark[parquet]'")
+            raise missing("Parquet needs", "pyarrow", "parquet")
         if args.output == "-":
             raise Problem("Parquet can't go to standard output: name a file, or with --partition a directory, with -o")
     elif plan.partition:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 from dalycapture.captured import Statistics, Told
 from dalycapture.create import open_writer
 from dalycapture.errors import CaptureError, reason
-from dalycapture.output import refuse_other_files
+from dalycapture.output import beside
 from dalycapture.reader import read_capture
 from dalytools import __version__
 from dalytools.problem import Problem
@@ -62,22 +62,24 @@ class Redacted:
 def redact(source: str, target: str, options: Options, keep: frozenset[What]) -> Redacted:
     """Write a redacted copy, pcapng. Raises Problem where it can not be written, or would not be what it says."""
     place = Path(os.path.realpath(target))
-    beside = place.with_name(f".{place.name}.{os.getpid()}.part")
     try:
-        refuse_other_files(place)
+        new = beside(place)
+    except CaptureError as error:
+        raise Problem(str(error)) from None
+    try:
         original = _Original(source, options, keep)
         before, broken = original.learn()
         for fill in _FILLS:
-            tally = original.write(beside, fill)
-            if _structure(beside, options) == before:
+            tally = original.write(new, fill)
+            if _structure(new, options) == before:
                 break
         else:
             raise Problem(
                 f"{source}: bytes that blank others come to look like frames, so nothing was written; "
                 "cut the capture up with editcap, and redact its parts"
             )
-        _prove(beside, original.copies)
-        beside.replace(place)
+        _prove(new, original.copies)
+        new.replace(place)
     except CaptureError as error:
         raise Problem(str(error)) from None
     except OutOfStepError:
@@ -88,7 +90,7 @@ def redact(source: str, target: str, options: Options, keep: frozenset[What]) ->
     except OSError as error:
         raise Problem(f"{target} can not be written: {reason(error)}") from None
     finally:
-        beside.unlink(missing_ok=True)
+        new.unlink(missing_ok=True)
     return Redacted(tally, broken)
 
 
@@ -114,11 +116,11 @@ class _Original:
             raise Problem(f"{self.source}: the capture holds no packet, so there is nothing to copy")
         return redactor.structure.digest(), "".join(broken)
 
-    def write(self, beside: Path, fill: int) -> Tally:
+    def write(self, new: Path, fill: int) -> Tally:
         """Write the copy; return what was blanked. fill: the byte that numbers are blanked with."""
         tally = Tally()
         blanker = Blanker(Fill(fill), tally, self.copies, self.keep, learning=False)
-        with open_writer(beside, application=_APPLICATION, about_machine=False) as writer:
+        with open_writer(new, application=_APPLICATION, about_machine=False) as writer:
             between = _Between(writer, tally)
 
             def take(packet: CapturedPacket, data: bytes, said: str) -> None:

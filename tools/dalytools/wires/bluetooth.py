@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from dalyref.packet import Packet
-from dalytools.problem import Problem
+from dalytools.extra import missing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -222,8 +222,6 @@ class Bluetooth:
             try:
                 from scapy.layers import bluetooth
             except ImportError:
-                raise Problem(
-                    "Bluetooth is read with the package scapy: type  pip install 'dalyshark[scapy]'"
-                ) from None
+                raise missing("Bluetooth is read with", "scapy", "scapy") from None
             self._scapy = bluetooth
         return self._scapy

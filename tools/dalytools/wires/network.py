@@ -14,7 +14,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from dalytools.problem import Problem
+from dalytools.extra import missing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -94,7 +94,7 @@ def _layers() -> _Layers:
         from scapy.layers.inet6 import IPv6
         from scapy.layers.l2 import CookedLinux, CookedLinuxV2, Ether, Loopback
     except ImportError:
-        raise Problem("TCP is read with the package scapy: type  pip install 'dalyshark[scapy]'") from None
+        raise missing("TCP is read with", "scapy", "scapy") from None
     conf.debug_dissector = 0  # what is damaged is no reason to stop
 
     def by(layer: Any) -> Callable[[bytes], Any]:

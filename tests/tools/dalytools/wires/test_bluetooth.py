@@ -224,7 +224,9 @@ def test_without_scapy_it_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     monkeypatch.setitem(sys.modules, "scapy.layers", None)
     air = Air()
     air.discover()
-    with pytest.raises(Problem, match=r"pip install 'dalyshark\[scapy\]'"):
+    with pytest.raises(
+        Problem, match=r"^Bluetooth is read with the package scapy: type .* -m pip install .*\[scapy\]'$"
+    ):
         air.values()
 
 
