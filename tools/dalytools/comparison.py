@@ -299,6 +299,8 @@ def _link_types(path: Path, carriers: Carriers, result: Comparison, listener: Li
     if not ours:
         names = ", ".join(link_type_name(number) for number in sorted(others))
         raise Problem(f"{path}: its link type is {names}; {NOT_READ}")
+    if carriers.nothing:
+        raise Problem(f"{path}: {carriers.nothing}")
     return ours
 
 

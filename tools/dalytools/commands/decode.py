@@ -231,6 +231,8 @@ def _decode_file(
             problems.append(f"{name}: its link type is {names}; {NOT_READ}")
         else:
             print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
+    elif carriers.nothing and not problems:
+        problems.append(f"{name}: {carriers.nothing}")
     elif not packets and not problems:
         print(f"dalyshark decode: {plain(name)}: the capture holds no packet", file=sys.stderr)  # noqa: T201
     return shown

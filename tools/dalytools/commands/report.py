@@ -92,6 +92,8 @@ def _read(name: str, args: argparse.Namespace, collected: Collected, search: Sea
         for carrier in carriers.finish():
             take(decoder.feed(carrier))
         take(decoder.finish())
+    if carriers.nothing:
+        problems.append(f"{name}: {carriers.nothing}")
 
 
 def _library() -> str:

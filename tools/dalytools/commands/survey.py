@@ -151,3 +151,5 @@ def _read(name: str, options: Options, wires: Choice | None, survey: Survey, pro
             take(decoder.feed(carrier))
         take(decoder.finish())
         survey.end_of_file()
+    if carriers.nothing:
+        problems.append(f"{name}: {carriers.nothing}")

@@ -58,6 +58,7 @@ _BASE: Final = 0x00000000_0000_1000_8000_00805F9B34FB
 
 _MOST_CONNECTIONS: Final = 256
 _MOST_HANDLES: Final = 256  # of Daly's, in one connection
+_MOST_TOLD: Final = 16  # of others, in a message
 
 
 @dataclass(slots=True)
@@ -90,6 +91,10 @@ class Bluetooth:
         self._connections: dict[tuple[int, int, int], _Connection] = {}  # by interface, adapter, connection handle
         self._names = 0
         self._scapy: Any = None
+        self.found = False
+        """A value of Daly's was seen."""
+        self.others: set[int] = set()
+        """Some handles of attributes that carry values and are not known as Daly's."""
 
     def values(self, packet: Packet) -> Sequence[Packet]:
         """Return the value of Daly's that a packet holds or completes; most hold none."""
@@ -175,7 +180,10 @@ class Bluetooth:
         opcode = pdu[0] if pdu else 0
         direction = self._side(connection, pdu)
         if direction:
+            self.found = True
             return (self._value(packet, connection, pdu[3:], direction),) if len(pdu) > 3 else ()
+        if (opcode in _WRITES or opcode in _NOTICES) and len(pdu) > 3 and len(self.others) < _MOST_TOLD:
+            self.others.add(int.from_bytes(pdu[1:3], "little"))
         if opcode == _READ_BY_TYPE and received != 1:
             connection.asks_characteristics = pdu[5:] == _CHARACTERISTIC.to_bytes(2, "little")
         elif received == 0:

@@ -30,9 +30,12 @@ class Carriers:
     def __init__(self, choice: Choice | None = None) -> None:
         """Raise Problem where a package is missing that the choice needs."""
         choice = choice or Choice()
+        self._ports = choice.tcp_ports
         self._tcp = Tcp(choice.tcp_ports) if choice.tcp_ports else None
         self._bluetooth = Bluetooth(choice.ble_handles)
         self._behind: list[Packet] = []
+        self._others = False  # packets of wires that need no choice
+        self._network = False
 
     @property
     def lost(self) -> bool:
@@ -54,9 +57,29 @@ class Carriers:
         """Name the TCP connection of the latest packet; empty: it was no segment of ours."""
         return self._tcp.latest if self._tcp is not None else ""
 
+    @property
+    def nothing(self) -> str:
+        """Say what a user may have chosen wrongly, where no packet so far was of a bus; empty: some were, or may be."""
+        if self._others or self._bluetooth.found or (self._tcp is not None and self._tcp.found):
+            return ""
+        if self._bluetooth.others:
+            handles = ", ".join(map(str, sorted(self._bluetooth.others)))
+            return (
+                "no Bluetooth attribute in it is known to be Daly's: its discovery is not in the capture; "
+                f"say which it is with --ble-handles, of {handles}"
+            )
+        if self._tcp is not None and self._network:
+            return (
+                f"no TCP segment in it is from or to port {self._ports}; tshark -q -z conv,tcp -r FILE lists the ports "
+                "there are: choose with --tcp-ports"
+            )
+        return ""
+
     def of(self, packet: Packet) -> Sequence[Packet]:
         """Return what has come for the decoder: of this packet, and of those that waited for it; often nothing."""
         tcp = self._tcp
+        self._others = self._others or packet.link_type in SERIAL_LINK_TYPES or packet.link_type == SOCKETCAN
+        self._network = self._network or packet.link_type in NETWORK
         if tcp is not None:
             tcp.latest = ""
         if tcp is None or not (tcp.waits or packet.link_type in NETWORK):

@@ -83,6 +83,11 @@ class Tcp:
         """Bytes of some connection are missing."""
 
     @property
+    def found(self) -> bool:
+        """Tell whether a segment of these ports was seen."""
+        return self._names > 0
+
+    @property
     def waits(self) -> bool:
         """Tell whether a gap may still be closed."""
         return bool(self._gaps)
