@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Protocol, TextIO
 
 from dalycapture.errors import CaptureError
 from dalycapture.linktype import link_type_name
-from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
 from dalytools import time_range, wire_times
 from dalytools.exports import bulk_choice, export, records
@@ -23,12 +22,14 @@ from dalytools.record_lines import line
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_binary_file, whole_file
 from dalytools.wires import choice
+from dalytools.wires.carried import carried
 from dalytools.wires.carriers import NOT_READ, Carriers
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Generator, Iterator
 
+    from dalyref.packet import Packet
     from dalyref.values import Fields
     from dalytools.exports.export import Plan
     from dalytools.exports.schema import Column
@@ -202,21 +203,15 @@ def _decode_file(
     packets = passed = 0
     with progress_bar(f"decode {plain(Path(name).name)}") as advance:
 
-        def batches() -> Iterator[list[Decoded]]:
+        def seen(packet: Packet) -> None:
             nonlocal packets, passed
-            try:
-                for packet in read_capture(name):
-                    packets += 1
-                    if not carriers.reads(packet.link_type):
-                        others.add(packet.link_type)
-                        passed += 1
-                    for carrier in carriers.of(packet):
-                        yield decoder.feed(carrier)
-                    if packets % 1024 == 0:
-                        advance(packets)
-            except CaptureError as error:
-                problems.append(str(error))
-            for carrier in carriers.finish():
+            packets += 1
+            if not carriers.reads(packet.link_type):
+                others.add(packet.link_type)
+                passed += 1
+
+        def batches() -> Iterator[list[Decoded]]:
+            for carrier in carried(name, carriers, problems, packet=seen, advance=advance):
                 yield decoder.feed(carrier)
             yield decoder.finish()
 
@@ -231,8 +226,6 @@ def _decode_file(
             problems.append(f"{name}: its link type is {names}; {NOT_READ}")
         else:
             print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
-    elif carriers.nothing and not problems:
-        problems.append(f"{name}: {carriers.nothing}")
     elif not packets and not problems:
         print(f"dalyshark decode: {plain(name)}: the capture holds no packet", file=sys.stderr)  # noqa: T201
     return shown

@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dalycapture.errors import CaptureError
-from dalycapture.reader import read_capture
 from dalyref.decoder import Decoder
 from dalytools import wire_times
 from dalytools.extra import missing
@@ -22,6 +20,7 @@ from dalytools.report.page import page
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
 from dalytools.wires import choice
+from dalytools.wires.carried import carried
 from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
@@ -80,20 +79,9 @@ def _read(name: str, args: argparse.Namespace, collected: Collected, search: Sea
             search.record(record)
 
     with progress_bar(f"report {plain(Path(name).name)}") as advance:
-        try:
-            for count, packet in enumerate(read_capture(name), 1):
-                search.packet(packet)
-                for carrier in carriers.of(packet):
-                    take(decoder.feed(carrier))
-                if count % 1024 == 0:
-                    advance(count)
-        except CaptureError as error:
-            problems.append(str(error))
-        for carrier in carriers.finish():
+        for carrier in carried(name, carriers, problems, packet=search.packet, advance=advance):
             take(decoder.feed(carrier))
         take(decoder.finish())
-    if carriers.nothing:
-        problems.append(f"{name}: {carriers.nothing}")
 
 
 def _library() -> str:

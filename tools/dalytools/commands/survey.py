@@ -8,8 +8,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dalycapture.errors import CaptureError
-from dalycapture.reader import read_capture
 from dalyref.decoder import Decoder
 from dalytools import wire_times
 from dalytools.findings.table import console
@@ -24,6 +22,7 @@ from dalytools.survey.wanted import Wanted
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
 from dalytools.wires import choice
+from dalytools.wires.carried import carried
 from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
@@ -137,19 +136,8 @@ def _read(name: str, options: Options, wires: Choice | None, survey: Survey, pro
             survey.add(record)
 
     with progress_bar(f"survey {plain(Path(name).name)}") as advance:
-        try:
-            for count, packet in enumerate(read_capture(name), 1):
-                for carrier in carriers.of(packet):
-                    survey.packet(carrier)
-                    take(decoder.feed(carrier))
-                if count % 1024 == 0:
-                    advance(count)
-        except CaptureError as error:
-            problems.append(str(error))
-        for carrier in carriers.finish():
+        for carrier in carried(name, carriers, problems, advance=advance):
             survey.packet(carrier)
             take(decoder.feed(carrier))
         take(decoder.finish())
         survey.end_of_file()
-    if carriers.nothing:
-        problems.append(f"{name}: {carriers.nothing}")
