@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
+from dalycapture.kind_counts import KindCounts
 from dalyref.kinds import Dialect, Kind
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class SideTally:
     name: str = ""
     bytes: int = 0
     records: int = 0
-    kinds: Counter[Kind] = field(default_factory=Counter[Kind])
+    kinds: KindCounts = field(default_factory=KindCounts)
     marked: int = 0  # bytes marked as received with an error
     breaks: int = 0
     counts: Counts | None = None  # what the driver has counted since the capture began; None: it does not count
@@ -119,7 +120,7 @@ class Tally:
     """What a capture has heard so far."""
 
     records: int = 0
-    kinds: Counter[Kind] = field(default_factory=Counter[Kind])
+    kinds: KindCounts = field(default_factory=KindCounts)
     seconds: float = 0.0
     end: End = End.STOPPED
     problem: str = ""  # one line, when the port was lost
@@ -140,17 +141,17 @@ class Tally:
     @property
     def good(self) -> int:
         """Frames with right checksum."""
-        return self.kinds[Kind.FRAME]
+        return self.kinds.good
 
     @property
     def bad(self) -> int:
         """Records that are damaged Daly frames, whole or cut off."""
-        return self.kinds[Kind.BAD_CHECKSUM] + self.kinds[Kind.SHORT]
+        return self.kinds.bad
 
     @property
     def junk(self) -> int:
         """Records that are no Daly frame at all."""
-        return self.kinds[Kind.JUNK] + self.kinds[Kind.FOREIGN]
+        return self.kinds.junk
 
     @property
     def lost(self) -> int:

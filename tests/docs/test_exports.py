@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
+
+from tests.docs.shell import shell
 
 from dalytools.exports import moments, records, values
 
@@ -21,18 +20,8 @@ def test_the_commands_run(tmp_path: Path) -> None:
     assert len(COMMANDS) == 4
     for name in ("pack", "other"):
         shutil.copy(ROOT / "pcap_samples/made-two-boards.pcapng", tmp_path / f"{name}.pcapng")
-    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     for command in COMMANDS:
-        done = subprocess.run(
-            ["/bin/sh", "-c", command],
-            cwd=tmp_path,
-            env={**os.environ, "PATH": path},
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert (done.returncode, done.stderr) == (0, ""), command
+        shell(command, tmp_path)
     made = {path.name for path in tmp_path.iterdir()}
     assert made == {"pack.pcapng", "other.pcapng", "pack.csv", "packs.parquet", "fleet"}
 

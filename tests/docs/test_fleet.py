@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import pyarrow.dataset
 import pytest
+from tests.docs.shell import shell
 
 from bench import fleet
 
@@ -24,21 +22,6 @@ if TYPE_CHECKING:
 SITES, DAYS = ("harbour", "mill"), ("2026-03-01", "2026-03-02")
 PAGE = (fleet.ROOT / "docs/fleet.md").read_text("utf-8")
 COMMANDS = re.findall(r"^    (dalyshark decode .*)$", PAGE, re.MULTILINE)
-PROGRAMS = f"{fleet.Path(sys.executable).parent}:{os.environ['PATH']}"
-
-
-def shell(text: str, folder: Path) -> str:
-    done = subprocess.run(
-        ["/bin/sh", "-c", text],
-        cwd=folder,
-        env={**os.environ, "PATH": PROGRAMS},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, ""), text
-    return done.stdout
 
 
 @pytest.fixture(scope="module")

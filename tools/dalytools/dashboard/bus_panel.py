@@ -39,8 +39,8 @@ def capture_line(status: Status, width: int) -> Text:
 
 def health_lines(state: State, status: Status, width: int, now: float) -> list[Text]:
     """Say how much comes, how much of it is good, and what is wrong with the talk on the bus."""
-    pieces = [said(f"{state.rate(now):.1f} records/s"), said(f"{state.good} good")]
-    for count, what, style in ((state.bad, "bad", _WORST), (state.junk, "junk", _ODD)):
+    pieces = [said(f"{state.rate(now):.1f} records/s"), said(f"{state.kinds.good} good")]
+    for count, what, style in ((state.kinds.bad, "bad", _WORST), (state.kinds.junk, "junk", _ODD)):
         pieces.append(said(f"{count} {what}", style if count else ""))
     unanswered = state.unanswered(now).total()
     pieces.append(said(f"{unanswered} unanswered", _WORST if unanswered else ""))

@@ -8,6 +8,7 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from dalycapture.kind_counts import KindCounts
 from dalyref.kinds import Kind
 from dalytools.dashboard.told import BoardTold
 
@@ -42,7 +43,7 @@ class State:
     reply_s: for how long a request waits.
     """
 
-    kinds: Counter[Kind] = field(default_factory=Counter[Kind])
+    kinds: KindCounts = field(default_factory=KindCounts)
     boards: dict[str, BoardTold] = field(default_factory=dict[str, BoardTold])
     last: deque[Heard] = field(default_factory=lambda: deque[Heard](maxlen=_LAST))
     reply_s: float = 1.0
@@ -65,21 +66,6 @@ class State:
     def records(self) -> int:
         """Records, without events."""
         return self.kinds.total() - self.kinds[Kind.EVENT]
-
-    @property
-    def good(self) -> int:
-        """Frames with right checksum."""
-        return self.kinds[Kind.FRAME]
-
-    @property
-    def bad(self) -> int:
-        """Damaged frames, whole or cut off."""
-        return self.kinds[Kind.BAD_CHECKSUM] + self.kinds[Kind.SHORT]
-
-    @property
-    def junk(self) -> int:
-        """Records that are no Daly frame at all."""
-        return self.kinds[Kind.JUNK] + self.kinds[Kind.FOREIGN]
 
     def early(self, record: Decoded, now: float) -> None:
         """Take a record at once. now: s, monotonic."""

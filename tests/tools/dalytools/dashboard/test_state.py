@@ -29,7 +29,7 @@ def test_values_of_a_board(tmp_path: Path) -> None:
     assert told["daly.balance.cell"].all == [1, 3]
     assert told["daly.remaining_capacity"].number == 156_250
     assert state.boards["1"].faults() == ["cell_volt_high_level_1", "cell_volt_high_level_2", "short_circuit_protect"]
-    assert (state.good, state.bad, state.junk, state.unasked) == (8, 0, 0, 0)
+    assert (state.kinds.good, state.kinds.bad, state.kinds.junk, state.unasked) == (8, 0, 0, 0)
 
 
 def test_a_value_is_as_old_as_its_reply(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_writes_retries_junk(tmp_path: Path) -> None:
         tmp_path,
         [(0.0, SWITCH_OFF), (0.1, ask), (0.7, ask), (1.0, ask[:12] + b"\0"), (2.0, b"\1\2\3"), (3, b""), (4, PACK)],
     )
-    assert (state.writes, state.retries, state.bad, state.junk, state.events) == (1, 1, 1, 1, 1)
+    assert (state.writes, state.retries, state.kinds.bad, state.kinds.junk, state.events) == (1, 1, 1, 1, 1)
     assert state.last_write
     assert state.last_write.data == SWITCH_OFF
     assert state.records == 6
