@@ -86,7 +86,7 @@ def soak(tshark: Tshark, args: argparse.Namespace) -> int:
     """Compare file after file until there are enough records. Return how many differences there were."""
     records = found = packets = 0
     kinds: dict[str, int] = {}
-    wires = tuple(KINDS)
+    wires = tuple(args.only or KINDS)
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="dalyshark-soak-") as folder:
         for seed in itertools.count(args.seed):
@@ -126,6 +126,7 @@ def main() -> int:
     parser.add_argument("--records", type=int, default=1_000_000, help="records a Wireshark (%(default)s)")
     parser.add_argument("--packets", type=int, default=PACKETS_A_FILE, help="packets a capture (%(default)s)")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="+", choices=KINDS, help="kinds of captures (all)")
     parser.add_argument("--keep", type=Path, help="keep captures that differ in this folder")
     args = parser.parse_args()
     return 1 if sum(soak(tshark, args) for tshark in wiresharks.each()) else 0

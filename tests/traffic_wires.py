@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RAW_IP, HCI_WITH_DIRECTION, SOCKETCAN = 101, 201, 227
 PORT = 4001
 WRITE, NOTIFY, OTHER = 0x0F, 0x11, 0x20
+_CONNECTIONS = 4  # as many as tests/traffic.py has interfaces
 HANDLES = f"{WRITE},{NOTIFY}"
 
 
@@ -32,42 +33,60 @@ class OnWire(NamedTuple):
     data: bytes
 
 
-def segment(side: int, connection: int, sequence: int, data: bytes) -> bytes:
+def segment(side: int, connection: int, sequence: int, data: bytes, acknowledged: int) -> bytes:
     """Lay bytes into an IPv4 packet with a TCP segment; checksums are left out."""
     ports = (50000 + connection, PORT) if side == 0 else (PORT, 50000 + connection)
-    head = struct.pack(">HHIIBBHHH", *ports, sequence & 0xFFFFFFFF, 0, 0x50, 0x18, 0x2000, 0, 0)
+    head = struct.pack(
+        ">HHIIBBHHH", *ports, sequence & 0xFFFFFFFF, acknowledged & 0xFFFFFFFF, 0x50, 0x18, 0x2000, 0, 0
+    )
     ends = (bytes((192, 0, 2, 10)), bytes((192, 0, 2, 20)))
     length = 20 + len(head) + len(data)
     ip = struct.pack(">BBHHHBBH", 0x45, 0, length, 1, 0, 64, 6, 0) + ends[side] + ends[1 - side]
     return ip + head + data
 
 
+def _starts(r: random.Random) -> dict[tuple[int, int], int]:
+    """Return where the sequence numbers of each connection and side start: half of them begin anew before long."""
+    return {
+        (connection, side): r.choice((1000, (1 << 32) - r.randrange(1, 20_000)))
+        for connection in range(_CONNECTIONS)
+        for side in range(2)
+    }
+
+
 def tcp(seed: int, *, lossy: bool = False, again: bool = True) -> Iterator[OnWire]:
-    """Yield segments of four connections. lossy: some never come, and none change places; again: some come twice."""
+    """Yield segments of four connections. lossy: some never come, and none change places; again: some come twice.
+
+    Each acknowledges what came before it. (Without that Wireshark's relative sequence numbers are those of the wire, and
+    it loses what spans their wrap: docs/wires.md 4.)
+    """
     r = random.Random(seed)
-    following: dict[tuple[int, int], int] = {}
-    kept: tuple[tuple[int, int], bytes] | None = None
+    following = _starts(r)
+    came = dict(following)
+    kept: tuple[tuple[int, int], int, bytes] | None = None
     for made in Traffic(seed).packets():
         if not made.data:
             continue
         key = (made.interface, made.direction - 1 if made.direction else r.randrange(2))
-        sequence = following.get(key, 1000)
+        sequence = following[key]
         following[key] = sequence + len(made.data)
-        packet = segment(key[1], key[0], sequence, made.data)
+        packet = segment(key[1], key[0], sequence, made.data, came[key[0], 1 - key[1]])
         luck = r.random()
         if lossy and luck < 0.01:
             continue
         if kept is not None and kept[0] != key:
-            yield OnWire(made.time_ns, kept[1])
+            came[kept[0]] = kept[1]
+            yield OnWire(made.time_ns, kept[2])
             kept = None
         if not lossy and luck < 0.02 and kept is None:
-            kept = (key, packet)
+            kept = (key, following[key], packet)
             continue
+        came[key] = following[key]
         yield OnWire(made.time_ns, packet)
         if again and luck > 0.98:
             yield OnWire(made.time_ns + 1000, packet)
         if kept is not None:
-            yield OnWire(made.time_ns + 2000, kept[1])
+            yield OnWire(made.time_ns + 2000, kept[2])
             kept = None
 
 
