@@ -36,9 +36,7 @@ class OnWire(NamedTuple):
 def segment(side: int, connection: int, sequence: int, data: bytes, acknowledged: int) -> bytes:
     """Lay bytes into an IPv4 packet with a TCP segment; checksums are left out."""
     ports = (50000 + connection, PORT) if side == 0 else (PORT, 50000 + connection)
-    head = struct.pack(
-        ">HHIIBBHHH", *ports, sequence & 0xFFFFFFFF, acknowledged & 0xFFFFFFFF, 0x50, 0x18, 0x2000, 0, 0
-    )
+    head = struct.pack(">HHIIBBHHH", *ports, sequence & 0xFFFFFFFF, acknowledged & 0xFFFFFFFF, 0x50, 0x18, 0x2000, 0, 0)
     ends = (bytes((192, 0, 2, 10)), bytes((192, 0, 2, 20)))
     length = 20 + len(head) + len(data)
     ip = struct.pack(">BBHHHBBH", 0x45, 0, length, 1, 0, 64, 6, 0) + ends[side] + ends[1 - side]
@@ -57,8 +55,8 @@ def _starts(r: random.Random) -> dict[tuple[int, int], int]:
 def tcp(seed: int, *, lossy: bool = False, again: bool = True) -> Iterator[OnWire]:
     """Yield segments of four connections. lossy: some never come, and none change places; again: some come twice.
 
-    Each acknowledges what came before it. (Without that Wireshark's relative sequence numbers are those of the wire, and
-    it loses what spans their wrap: docs/wires.md 4.)
+    Each acknowledges what came before it: else Wireshark's relative sequence numbers would be those of the wire, and it
+    would lose what spans their wrap (docs/wires.md 4).
     """
     r = random.Random(seed)
     following = _starts(r)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dalyref.packet import Packet
 
 SOCKETCAN: Final = 227
-_MOST_BEHIND: Final = 1024
+_MOST_BEHIND: Final = 16384
 _MOST_BYTES_BEHIND: Final = 1 << 22
 """Packets, and bytes of them, that wait until a gap of a TCP connection is closed."""
 
@@ -34,6 +34,7 @@ class Carriers:
         self._tcp = Tcp(choice.tcp_ports) if choice.tcp_ports else None
         self._bluetooth = Bluetooth(choice.ble_handles)
         self._behind: list[Packet] = []
+        self._bytes_behind = 0
         self._others = False  # packets of wires that need no choice
         self._network = False
 
@@ -85,17 +86,17 @@ class Carriers:
         if tcp is None or not (tcp.waits or packet.link_type in NETWORK):
             return self._at_once(packet)
         given = tcp.feed(packet) if packet.link_type in NETWORK else tcp.pass_time(packet.time_ns)
-        self._behind += given
+        self._hold(given)
         if packet.link_type not in NETWORK:
-            self._behind += self._at_once(packet)
-        if len(self._behind) > _MOST_BEHIND or sum(len(one.data) for one in self._behind) > _MOST_BYTES_BEHIND:
-            self._behind += tcp.give_up()
+            self._hold(self._at_once(packet))
+        if len(self._behind) > _MOST_BEHIND or self._bytes_behind > _MOST_BYTES_BEHIND:
+            self._hold(tcp.give_up())
         return () if tcp.waits else self._release()
 
     def finish(self) -> Sequence[Packet]:
         """Take the end of the capture; return what was held back."""
         if self._tcp is not None:
-            self._behind += self._tcp.give_up()
+            self._hold(self._tcp.give_up())
         return self._release()
 
     def reads(self, link_type: int) -> bool:
@@ -116,9 +117,14 @@ class Carriers:
             return self._bluetooth.values(packet)
         return ()
 
+    def _hold(self, packets: Sequence[Packet]) -> None:
+        self._behind += packets
+        self._bytes_behind += sum(len(one.data) for one in packets)
+
     def _release(self) -> Sequence[Packet]:
         released = sorted(self._behind, key=lambda packet: packet.number)
         self._behind = []
+        self._bytes_behind = 0
         return released
 
 

@@ -36,6 +36,8 @@ class Segment:
     source: tuple[str, int]
     destination: tuple[str, int]
     sequence: int
+    acknowledged: int | None
+    """The sequence number before which it has all bytes of the other direction; None: it does not say."""
     flags: int
     data: bytes
     missing: int
@@ -71,6 +73,7 @@ class Network:
             (str(ip.src), int(tcp.sport)),
             (str(ip.dst), int(tcp.dport)),
             int(tcp.seq),
+            int(tcp.ack) if int(tcp.flags) & ACK else None,
             int(tcp.flags),
             there,
             max(0, length - len(tcp.original)) if length else 0,

@@ -4,7 +4,8 @@
     segments     1000 ..  1013 ..  1039 ..  1026 ..          by sequence number
     handed over  1000     1013              1026+1039        of the packet that closed the gap
 
-A gap that stays open divides the stream: what is behind it is handed over as packets of its own, ``after_gap``.
+A gap that stays open divides the stream: what is behind it is handed over as packets of its own, ``after_gap``; so is
+what comes later of the gap itself.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from dalyref.packet import Packet
-from dalytools.wires.network import ACK, RST, SYN, Network
+from dalytools.wires.network import RST, SYN, Network
 
 if TYPE_CHECKING:
     from dalyref.packet import Direction
@@ -21,40 +22,65 @@ if TYPE_CHECKING:
     from dalytools.wires.network import Segment
 
 MOST_HELD: Final = 65536
-"""Bytes of one direction that wait behind a gap."""
-LONGEST_WAIT_NS: Final = 1_000_000_000
+"""Bytes of one direction that wait behind a gap; and how far back a segment may reach."""
+RECEIVED_WAIT_NS: Final = 1_000_000_000
+"""How long bytes that were acknowledged, and so arrived, may still come in this capture."""
+LONGEST_WAIT_NS: Final = 60_000_000_000
+"""How long others may: a sender waits a second at least before it sends again, and longer each time (RFC 6298)."""
 MOST_CONNECTIONS: Final = 1024
 _MOST_SEGMENTS: Final = 1024  # that wait behind a gap
+_MOST_SKIPPED: Final = 64  # gaps that were given up, remembered for what comes of them later
 _SPACE: Final = 1 << 32
-
-
-def _behind(number: int, reference: int) -> int:
-    """Return how far a sequence number lies behind another, negative before it: they count round."""
-    return (number - reference + _SPACE // 2) % _SPACE - _SPACE // 2
+_NEVER: Final = 1 << 63
 
 
 @dataclass(frozen=True, slots=True)
-class _Waiting:
-    """A segment behind a gap, and the packet it came in."""
+class _Piece:
+    """Bytes of a segment, and the packet it came in. Places are sequence numbers that do not begin anew."""
 
-    sequence: int
+    start: int
     data: bytes
-    missing: int
+    end: int
+    """Behind the data, or behind what the capture cut off of it."""
     packet: Packet
+
+    def part(self, start: int, end: int) -> _Piece:
+        return _Piece(start, self.data[start - self.start : end - self.start], end, self.packet)
 
 
 @dataclass(slots=True)
 class _Side:
     """One direction of a connection."""
 
-    base: int | None = None
-    """The first sequence number that was seen."""
+    first: int | None = None
+    """The place of the first byte, as far as is known."""
+    opened: int | None = None
+    """The sequence number of its SYN."""
     next: int = 0
-    """The sequence number of the next byte."""
+    """The place of the next byte to hand over."""
+    acknowledged: int | None = None
+    """Sequence number before which the other side has everything."""
     lost: bool = False
     """Bytes before the next one are missing."""
-    waiting: list[_Waiting] = field(default_factory=list[_Waiting])
+    waiting: list[_Piece] = field(default_factory=list[_Piece])
+    """In order; none has a byte of another."""
     held: int = 0
+    waits_from_ns: int = 0
+    """When the first of those that wait came."""
+    received_ns: int | None = None
+    """When it was known that the other side has what is missing here."""
+    skipped: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+    """Places of bytes that were given up: from, to."""
+
+    def place(self, number: int) -> int:
+        """Return the place of a sequence number: that next to what is expected."""
+        return self.next + (number - self.next + _SPACE // 2) % _SPACE - _SPACE // 2
+
+    @property
+    def deadline_ns(self) -> int:
+        """When what waits is handed over without what is missing before it."""
+        longest = self.waits_from_ns + LONGEST_WAIT_NS
+        return longest if self.received_ns is None else min(longest, self.received_ns + RECEIVED_WAIT_NS)
 
 
 @dataclass(slots=True)
@@ -70,8 +96,9 @@ class Tcp:
 
     def __init__(self, ports: Numbers) -> None:
         self._network = Network(ports)
-        self._connections: dict[tuple[tuple[str, int], tuple[str, int]], Connection] = {}
+        self._connections: dict[tuple[tuple[str, int], tuple[str, int]], Connection] = {}  # latest used last
         self._gaps: dict[tuple[str, int], Connection] = {}  # open ones, by the connection's name and side
+        self._due_ns = _NEVER  # when the first of them may have to be given up
         self._names = 0
         self.late: set[str] = set()
         """Connections, by name, with segments out of order, or with old bytes and new ones."""
@@ -99,20 +126,23 @@ class Tcp:
         if segment is not None:
             connection, which = self._connection(segment, out)
             self.latest = connection.name
+            self._acknowledge(connection, 1 - which, segment, packet)
             self._take(connection, which, segment, packet, out)
         return out
 
     def pass_time(self, time_ns: int) -> list[Packet]:
         """Take the time of a packet of whatever kind; return what waited for too long."""
-        return self.give_up(before_ns=time_ns - LONGEST_WAIT_NS) if self._gaps else []
+        return self.give_up(now_ns=time_ns) if time_ns > self._due_ns else []
 
-    def give_up(self, *, before_ns: int | None = None) -> list[Packet]:
-        """Close the gaps behind which segments wait since before a time, or all."""
+    def give_up(self, *, now_ns: int | None = None) -> list[Packet]:
+        """Close the gaps whose time is over, or all."""
         out: list[Packet] = []
+        self._due_ns = _NEVER
         for (_, which), connection in list(self._gaps.items()):
             side = connection.sides[which]
-            while side.waiting and (before_ns is None or min(one.packet.time_ns for one in side.waiting) < before_ns):
+            while side.waiting and (now_ns is None or side.deadline_ns < now_ns):
                 self._skip(connection, which, out)
+            self._note(connection, which)
         return out
 
     def _connection(self, segment: Segment, out: list[Packet]) -> tuple[Connection, int]:
@@ -120,114 +150,219 @@ class Tcp:
         ends = sorted((segment.source, segment.destination))
         key = (ends[0], ends[1])
         which = ends.index(segment.source)
-        connection = self._connections.get(key)
-        if connection is not None and segment.flags & (SYN | ACK) == SYN:
-            known = connection.sides[which].base
-            if known not in {None, segment.sequence}:
-                self._end(self._connections.pop(key), out)
+        connection = self._connections.pop(key, None)
+        unannounced = False
+        if connection is not None and segment.flags & SYN:
+            if not _may_open(segment.sequence, connection.sides[which], connection.sides[1 - which]):
+                self._end(connection, out)
                 connection = None
+        elif connection is not None and _far_back(segment, connection.sides[which]):
+            unannounced = True
+            self._end(connection, out)
+            connection = None
         if connection is None:
             if len(self._connections) >= MOST_CONNECTIONS:
                 self._end(self._connections.pop(next(iter(self._connections))), out)
             self._names += 1
-            connection = self._connections[key] = Connection(f"tcp {self._names}")
+            connection = Connection(f"tcp {self._names}")
+        self._connections[key] = connection
+        if unannounced:  # for Wireshark it goes on
+            self.late.add(connection.name)
+            self.lost = True
         return connection, which
 
     def _end(self, connection: Connection, out: list[Packet]) -> None:
         for which in (0, 1):
             while connection.sides[which].waiting:
                 self._skip(connection, which, out)
+            self._note(connection, which)
+
+    def _acknowledge(self, connection: Connection, which: int, segment: Segment, packet: Packet) -> None:
+        """Take what a segment says of the bytes of the other direction, `which`."""
+        side, number = connection.sides[which], segment.acknowledged
+        if number is None:
+            return
+        known = side.acknowledged
+        if known is None or (number - known) % _SPACE < _SPACE // 2:
+            side.acknowledged = number
+            if side.waiting:
+                self._received(side, packet)
+                self._note(connection, which)
+
+    def _received(self, side: _Side, packet: Packet) -> None:
+        """Note when it is known that the other side has what is missing before those that wait."""
+        known = side.acknowledged
+        if side.received_ns is None and known is not None and side.place(known) >= side.waiting[0].start:
+            side.received_ns = packet.time_ns
 
     def _take(self, connection: Connection, which: int, segment: Segment, packet: Packet, out: list[Packet]) -> None:
-        side, sequence = connection.sides[which], segment.sequence
-        begins = bool(segment.flags & SYN)
-        if begins:
-            sequence = (sequence + 1) % _SPACE
-        if side.base is None:
-            side.base, side.next = segment.sequence, sequence
-        length = len(segment.data) + segment.missing
-        if segment.flags & RST or length <= -_behind(sequence, side.next):
-            if segment.data:
-                self.again.add(connection.name)
-            return  # nothing in it, or nothing new
-        if _behind(sequence, side.next) < 0:
-            self.late.add(connection.name)
-        self._wait(connection, side, _Waiting(sequence, segment.data, segment.missing, packet))
-        if _behind(side.waiting[0].sequence, side.next) <= 0:
+        side = connection.sides[which]
+        if side.first is None:
+            side.next = segment.sequence + _SPACE
+        start = side.place(segment.sequence)
+        if segment.flags & SYN:
+            side.opened = segment.sequence
+            start += 1
+        if side.first is None:
+            side.first = side.next = start
+            if side.opened is None:
+                side.skipped.append((start - MOST_HELD, start))
+        one = _Piece(start, segment.data, start + len(segment.data) + segment.missing, packet)
+        if segment.flags & RST:
+            return
+        if one.start < side.next:
+            one = self._old(connection, which, one, out)
+        if _brings_something(one, side):
+            self._wait(connection, side, one)
+        if side.waiting and side.waiting[0].start == side.next:
             self._drain(connection, which, packet, out)
         while side.held > MOST_HELD or len(side.waiting) > _MOST_SEGMENTS:
             self._skip(connection, which, out)
+        self._note(connection, which)
+
+    def _note(self, connection: Connection, which: int) -> None:
+        """Note whether a side has a gap, and until when."""
+        side = connection.sides[which]
         if side.waiting:
             self._gaps[connection.name, which] = connection
+            self._due_ns = min(self._due_ns, side.deadline_ns)
         else:
             self._gaps.pop((connection.name, which), None)
 
-    def _wait(self, connection: Connection, side: _Side, one: _Waiting) -> None:
-        """Put a segment in its place by sequence numbers."""
-        at = len(side.waiting)
-        while at and _behind(side.waiting[at - 1].sequence, one.sequence) > 0:
-            at -= 1
-        if at and side.waiting[at - 1].sequence == one.sequence and len(side.waiting[at - 1].data) >= len(one.data):
-            self.again.add(connection.name)
-            return  # it has come before
-        if at < len(side.waiting):
+    def _old(self, connection: Connection, which: int, one: _Piece, out: list[Packet]) -> _Piece:
+        """Take a segment that begins before the next byte: hand over what had been given up; return what is new."""
+        side = connection.sides[which]
+        if one.data == b"" and one.end == one.start:
+            return one
+        if one.end > side.next:
             self.late.add(connection.name)
-        side.waiting.insert(at, one)
-        side.held += len(one.data)
+        else:
+            self.again.add(connection.name)
+        keep_alive = len(one.data) == 1 and one.end == side.next
+        known_to = min(one.start + len(one.data), side.next)
+        if not keep_alive and any(start < known_to and end > one.start for start, end in side.skipped):
+            self.late.add(connection.name)
+            self._miss(side)
+            remaining: list[tuple[int, int]] = []
+            for start, end in side.skipped:
+                begin, stop = max(start, one.start), min(end, known_to)
+                if begin >= stop:
+                    remaining.append((start, end))
+                    continue
+                out.append(self._handed(connection, which, one.part(begin, stop).data, one.packet, after_gap=True))
+                remaining += [(a, b) for a, b in ((start, begin), (stop, end)) if a < b]
+            side.skipped = remaining
+        return one.part(side.next, one.end) if one.end > side.next else one
+
+    def _wait(self, connection: Connection, side: _Side, one: _Piece) -> None:
+        """Put a segment in its place; what waits there already stays."""
+        waiting = side.waiting
+        if not waiting:
+            side.waits_from_ns = one.packet.time_ns
+            side.received_ns = None
+        if not waiting or one.start >= waiting[-1].end:
+            waiting.append(one)
+            side.held += len(one.data)
+        elif one.start < one.end:
+            pieces: list[_Piece] = []
+            start = one.start
+            for other in waiting:
+                if start < (stop := min(one.end, other.start)):
+                    pieces.append(one.part(start, stop))
+                start = max(start, other.end)
+            if start < one.end:
+                pieces.append(one.part(start, one.end))
+            if pieces:
+                self.late.add(connection.name)
+            else:
+                self.again.add(connection.name)
+            side.held += sum(len(piece.data) for piece in pieces)
+            waiting += pieces
+            waiting.sort(key=lambda piece: (piece.start, piece.end))
+        self._received(side, one.packet)
 
     def _skip(self, connection: Connection, which: int, out: list[Packet]) -> None:
         """Give a gap up: what follows it, up to the next one, is handed over by packets of its own."""
         side = connection.sides[which]
-        side.next = side.waiting[0].sequence
-        self._miss(side)
+        self._miss(side, side.waiting[0].start)
         self._drain(connection, which, None, out)
-        if not side.waiting:
-            self._gaps.pop((connection.name, which), None)
 
-    def _miss(self, side: _Side) -> None:
+    def _miss(self, side: _Side, until: int | None = None) -> None:
+        """Note that bytes are lost, up to a place."""
         side.lost = self.lost = True
+        if until is not None:
+            side.skipped.append((side.next, until))
+            del side.skipped[:-_MOST_SKIPPED]
+            side.next = until
 
     def _drain(self, connection: Connection, which: int, packet: Packet | None, out: list[Packet]) -> None:
         """Hand over what is in order. packet: that all of it counts to; None: the latest that it came in."""
         side = connection.sides[which]
-        run = b""
-        direction: Direction = "inbound" if which else "outbound"
+        run: list[bytes] = []
+        by = packet
 
-        def hand(by: Packet) -> None:
-            if run:
-                out.append(
-                    Packet(
-                        number=by.number,
-                        time_ns=by.time_ns,
-                        data=run,
-                        interface=by.interface,
-                        direction=direction,
-                        comment=by.comment,
-                        link_type=by.link_type,
-                        transport="tcp",
-                        connection=connection.name,
-                        after_gap=side.lost,
-                    )
-                )
+        def hand() -> None:
+            if by is not None and (data := b"".join(run)):
+                out.append(self._handed(connection, which, data, by, after_gap=side.lost))
                 side.lost = False
+            run.clear()
 
-        latest = packet
-        while side.waiting and (old := -_behind(side.waiting[0].sequence, side.next)) >= 0:
+        while side.waiting and side.waiting[0].start == side.next:
             one = side.waiting.pop(0)
             side.held -= len(one.data)
-            new = len(one.data) + one.missing - old
-            if new <= 0:
-                continue
-            if packet is None:
-                if run and latest is not None:
-                    hand(latest)
-                    run = b""
-                latest = one.packet if latest is None or latest.number < one.packet.number else latest
-            side.next = (side.next + new) % _SPACE
-            run += one.data[old:]
-            if one.missing and latest is not None:
-                hand(latest)
-                run = b""
-                self._miss(side)
-        if latest is not None:
-            hand(latest)
+            if packet is None and (by is None or by.number < one.packet.number):
+                hand()
+                by = one.packet
+            run.append(one.data)
+            side.next += len(one.data)
+            if one.end > side.next:
+                hand()
+                self._miss(side, one.end)
+        hand()
+        side.received_ns = None
+        if side.waiting:
+            side.waits_from_ns = min(one.packet.time_ns for one in side.waiting)
+            latest = max((one.packet for one in side.waiting), key=lambda packet: packet.number)
+            self._received(side, latest if packet is None else packet)
+
+    def _handed(self, connection: Connection, which: int, data: bytes, by: Packet, *, after_gap: bool) -> Packet:
+        direction: Direction = "inbound" if which else "outbound"
+        return Packet(
+            number=by.number,
+            time_ns=by.time_ns,
+            data=data,
+            interface=by.interface,
+            direction=direction,
+            comment=by.comment,
+            link_type=by.link_type,
+            transport="tcp",
+            connection=connection.name,
+            after_gap=after_gap,
+        )
+
+
+def _brings_something(one: _Piece, side: _Side) -> bool:
+    """Tell whether a segment has bytes still to be handed over, or tells by its place alone that some are lost."""
+    if one.start < one.end:
+        return one.end > side.next
+    return one.start > (side.waiting[-1].end if side.waiting else side.next)
+
+
+def _may_open(number: int, side: _Side, other: _Side) -> bool:
+    """Tell whether a SYN is the one that a connection began with, or sent again."""
+    if side.opened is not None:
+        return side.opened == number
+    if side.first is not None:
+        return side.first % _SPACE == (number + 1) % _SPACE
+    return other.first is None or (other.opened is not None and other.next == other.first)
+
+
+def _far_back(segment: Segment, side: _Side) -> bool:
+    """Tell whether a segment's bytes lie too far back to be sent again: another connection, whose SYN is not here."""
+    length = len(segment.data) + segment.missing
+    return (
+        side.first is not None
+        and length > 0
+        and not segment.flags & RST
+        and side.place(segment.sequence) < side.next - MOST_HELD
+    )

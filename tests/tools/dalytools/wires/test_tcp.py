@@ -37,14 +37,15 @@ Handed = tuple[int, bytes, bool]
 """Number of the packet it counts to, bytes, whether bytes before it are lost."""
 
 
-def tcp(side: int, sequence: int, data: bytes, flags: str = "PA") -> Layers:
+def tcp(side: int, sequence: int, data: bytes, flags: str = "PA", acknowledged: int = 0) -> Layers:
     ports = (50000, 8899) if side == CLIENT else (8899, 50000)
-    return TCP(sport=ports[0], dport=ports[1], seq=sequence & 0xFFFFFFFF, flags=flags) / Raw(data)
+    numbers = (sequence & 0xFFFFFFFF, acknowledged & 0xFFFFFFFF)
+    return TCP(sport=ports[0], dport=ports[1], seq=numbers[0], ack=numbers[1], flags=flags) / Raw(data)
 
 
-def ip(side: int, sequence: int, data: bytes, flags: str = "PA") -> bytes:
+def ip(side: int, sequence: int, data: bytes, flags: str = "PA", acknowledged: int = 0) -> bytes:
     ends = ("192.0.2.10", "192.0.2.20") if side == CLIENT else ("192.0.2.20", "192.0.2.10")
-    return bytes(IP(src=ends[0], dst=ends[1]) / tcp(side, sequence, data, flags))
+    return bytes(IP(src=ends[0], dst=ends[1]) / tcp(side, sequence, data, flags, acknowledged))
 
 
 def packet(number: int, data: bytes, *, ms: float | None = None, link_type: int = RAW_IP) -> Packet:
@@ -81,10 +82,69 @@ def test_a_gap_that_stays_divides() -> None:
         (2, b"ijkl", True),
         (3, b"m", False),
     ]
-    late = [*of((1000, b"abcd"), (1008, b"ijkl")), packet(3, ip(SERVER, 1004, b"efgh"), ms=1021)]
-    assert handed(late) == [(1, b"abcd", False), (2, b"ijkl", True)]  # more than a second after the one at 20 ms
-    in_time = [*late[:2], packet(3, ip(SERVER, 1004, b"efgh"), ms=1020)]
-    assert handed(in_time) == [(1, b"abcd", False), (3, b"efghijkl", False)]
+
+
+@pytest.mark.parametrize("start", [1000, (1 << 32) - 7], ids=["plain", "sequence numbers begin anew"])
+def test_how_long_a_gap_may_be_closed(start: int) -> None:
+    """A minute, for a sender may take that long; a second, where the other side says that it has the bytes."""
+    before = [*of((start, b"abcd"), (start + 8, b"ijkl"))]  # the latter at 20 ms
+    late = [(1, b"abcd", False), (2, b"ijkl", True)]
+
+    def fill(ms: float) -> Packet:
+        return packet(4, ip(SERVER, start + 4, b"efgh", "A"), ms=ms)
+
+    def has(until: int, ms: float = 500) -> Packet:
+        return packet(3, ip(CLIENT, 50, b"", "A", start + until), ms=ms)
+
+    assert handed([*before, fill(60_020)]) == [(1, b"abcd", False), (4, b"efghijkl", False)]
+    assert handed([*before, packet(3, b"", ms=60_021), fill(60_022)])[:2] == late
+    assert handed([*before, has(8), fill(1500)]) == [(1, b"abcd", False), (4, b"efghijkl", False)]
+    assert handed([*before, has(8), fill(1501)])[:2] == late
+    assert handed([*before, has(7), fill(1501)])[-1] == (4, b"efghijkl", False)  # one byte is asked for again
+    earlier = [before[0], packet(2, ip(CLIENT, 50, b"", "A", start + 8)), packet(3, before[1].data, ms=30)]
+    assert handed([*earlier, fill(1030)])[-1] == (4, b"efghijkl", False)
+    assert handed([*earlier, fill(1031)])[1] == (3, b"ijkl", True)
+
+
+def test_what_comes_after_its_gap_was_given_up_is_shown() -> None:
+    """No byte that is in the capture is passed over: it was never handed over before."""
+    given_up = [*of((1000, b"abcd"), (1008, b"ijkl")), packet(3, b"", ms=61_000)]
+    then = [(1003, b"defghi"), (1012, b"m"), (1004, b"efgh"), (1013, b"n")]
+    packets = [packet(number, ip(SERVER, *one), ms=61_000) for number, one in enumerate(then, 4)]
+    assert handed([*given_up, *packets]) == [
+        (1, b"abcd", False),
+        (2, b"ijkl", True),
+        (4, b"efgh", True),
+        (5, b"m", True),  # stood behind "ijkl"
+        (7, b"n", False),
+    ]
+
+
+def test_a_capture_may_begin_with_segments_in_the_wrong_order() -> None:
+    assert handed(of((1004, b"efgh"), (1000, b"abcd"), (1008, b"ijkl"))) == [
+        (1, b"efgh", False),
+        (2, b"abcd", True),
+        (3, b"ijkl", True),
+    ]
+    assert handed(of((1004, b""), (1003, b"x"), (1004, b"e"))) == [(3, b"e", False)]  # a keep-alive
+    opened = [packet(1, ip(SERVER, 1003, b"", "S")), *of((0, b""), (1002, b"cdef"))[1:]]
+    assert handed(opened) == [(2, b"ef", False)]  # nothing comes before a SYN
+
+
+def test_of_bytes_that_come_twice_the_first_are_taken() -> None:
+    segments = [(1000, b"abcd"), (1008, b"ijkl"), (1006, b"XXXXXXmn"), (1002, b"YYef"), (1006, b"gh")]
+    assert handed(of(*segments)) == [(1, b"abcd", False), (4, b"efXXijklmn", False)]
+
+
+def test_a_segment_without_bytes_tells_of_a_gap() -> None:
+    """As many as come: they take no place of those that wait."""
+    empty = [(1008, b"")] * 2000
+    assert handed(of((1000, b"abcd"), *empty, (1004, b"efgh"), (1008, b"i"))) == [
+        (1, b"abcd", False),
+        (2002, b"efgh", False),
+        (2003, b"i", False),
+    ]
+    assert handed(of((1000, b"abcd"), (1008, b""), (1008, b"i"))) == [(1, b"abcd", False), (3, b"i", True)]
 
 
 def test_what_waits_behind_a_gap_is_bounded() -> None:
@@ -122,6 +182,31 @@ def test_a_syn_with_another_number_begins_a_connection() -> None:
         (b"answer", "tcp 1", "inbound"),
         (b"new", "tcp 2", "inbound"),
     ]
+
+
+def names(packets: Sequence[bytes]) -> list[tuple[bytes, str]]:
+    carriers = Carriers(CHOICE)
+    given = [one for number, data in enumerate(packets, 1) for one in carriers.of(packet(number, data))]
+    return [(one.data, one.connection) for one in (*given, *carriers.finish())]
+
+
+def test_a_connection_begins_without_all_of_its_handshake() -> None:
+    old = [ip(SERVER, 500_000, b"old")]
+    assert names([*old, ip(SERVER, 12, b"", "SA"), ip(SERVER, 13, b"new")])[-1] == (b"new", "tcp 2")
+    assert names([*old, ip(CLIENT, 12, b"", "S"), ip(SERVER, 99, b"", "SA"), ip(SERVER, 100, b"new")])[-1][1] == "tcp 2"
+    assert names([ip(SERVER, 99, b"", "SA"), ip(CLIENT, 7, b"", "S"), ip(CLIENT, 8, b"x")]) == [(b"x", "tcp 1")]
+    assert names([*old, ip(SERVER, 500_003 - 65536, b"back")])[-1] == (b"back", "tcp 1")
+    assert names([*old, ip(SERVER, 500_003 - 65537, b"new")])[-1] == (b"new", "tcp 2")
+    assert names([*old, ip(SERVER, 1, b"refused", "RA")]) == [(b"old", "tcp 1")]
+
+
+def test_many_short_connections_do_not_end_a_long_one() -> None:
+    """Who connects for each reading makes a thousand connections in a night."""
+    packets = [ip(SERVER, 1000, b"a")]
+    for client in range(1500):
+        packets.append(bytes(IP(src="192.0.2.30") / TCP(sport=1024 + client, dport=8899, flags="S")))
+        packets.append(ip(SERVER, 1001 + client, b"b"))
+    assert {name for _, name in names(packets)} == {"tcp 1"}
 
 
 SEGMENT = tcp(SERVER, 1, ASK)
@@ -170,7 +255,8 @@ def test_the_order_of_the_file_is_kept() -> None:
     ]
     assert [number for number, _, _ in handed(packets)] == [1, 3, 4, 5, 6]
     assert [number for number, _, _ in handed(packets[:4])] == [1, 2, 3, 4]
-    waits = [*packets[:2], packet(3, b"serial", ms=2000, link_type=USER0), packet(4, b"x", ms=2001, link_type=USER0)]
+    waits = [*packets[:2], packet(3, b"serial", ms=60_021, link_type=USER0)]
+    waits.append(packet(4, b"x", ms=60_022, link_type=USER0))
     carriers = Carriers(CHOICE)
     assert [[one.number for one in carriers.of(each)] for each in waits] == [[1], [], [2, 3], [4]]
 
