@@ -63,6 +63,9 @@ M.read = {
   hundreds = function(raw, at)
     return number(raw, at, 2) * 100
   end,
+  tens = function(raw, at)
+    return number(raw, at, 2) * 10
+  end,
   temperature = function(raw, at, length)
     return number(raw, at, length) - 40
   end,

@@ -19,9 +19,15 @@ modbus.register modbus.count modbus.byte_count modbus.value modbus.exception mod
 modbus.absent changed changed_from contradiction contradicts fault_raised fault_cleared fault_count
 cell.voltage temperature cells.voltage cells.count sensors.temperature sensors.average soc state cell_count
 sensor_count mos.charge mos.discharge setting.soc setting.mos_charge setting.mos_discharge setting.cell_high_1
-setting.balancer clock command password software_version
+setting.balancer clock command password software_version setting.sleep setting.balance_current
 """
-WATCHED = tuple(f"daly.{name}" for name in _WATCHED.split())
+_LIMITS = """
+cell_high_2 cell_low_1 cell_low_2 pack_high_1 pack_high_2 pack_low_1 pack_low_2 charge_current_1 charge_current_2
+discharge_current_1 discharge_current_2 charge_temp_high_1 charge_temp_high_2 charge_temp_low_1 charge_temp_low_2
+discharge_temp_high_1 discharge_temp_high_2 discharge_temp_low_1 discharge_temp_low_2 cell_difference_1
+cell_difference_2 temp_difference_1 temp_difference_2 soc_low_1 soc_low_2
+"""
+WATCHED = tuple(f"daly.{name}" for name in (*_WATCHED.split(), *(f"setting.{name}" for name in _LIMITS.split())))
 
 _A5_HAS_TOO = {"daly.direction", "daly.request_in"}
 """Left out of what is watched on A5 frames, which tests/meaning.py and the tests of exchanges look at."""
@@ -126,6 +132,47 @@ def pack_d2(
 PACK_REGISTERS = 15
 """28 to 36."""
 
+# 81 registers 130 to 167 as a real board told them, four each (warning, protection, return, delay), currents five.
+# fmt: off
+LIMITS = [
+    3450, 3550, 3400, 5000, 2800, 2700, 2900, 5000, 552, 562, 542, 1000, 456, 440, 450, 1000,
+    28400, 28000, 1000, 27000, 1000, 31600, 32000, 1000, 33000, 1000,
+    90, 95, 90, 1000, 45, 40, 45, 1000, 90, 95, 90, 1000, 25, 40, 25, 1000,
+    450, 500, 450, 1000, 10, 15, 12, 1000, 0, 0, 20, 1000, 135, 140,
+]
+# fmt: on
+BALANCE: dict[str, object] = {"setting__balance_current": 1000}
+LIMITS_TOLD = {
+    "setting.cell_high_1": 3450,
+    "setting.cell_high_2": 3550,
+    "setting.cell_low_1": 2800,
+    "setting.cell_low_2": 2700,
+    "setting.pack_high_1": 55.2,
+    "setting.pack_high_2": 56.2,
+    "setting.pack_low_1": 45.6,
+    "setting.pack_low_2": 44.0,
+    "setting.charge_current_1": -160.0,
+    "setting.charge_current_2": -200.0,
+    "setting.discharge_current_1": 160.0,
+    "setting.discharge_current_2": 200.0,
+    "setting.charge_temp_high_1": 50,
+    "setting.charge_temp_high_2": 55,
+    "setting.charge_temp_low_1": 5,
+    "setting.charge_temp_low_2": 0,
+}
+MORE_LIMITS_TOLD = {
+    "setting.discharge_temp_high_1": 50,
+    "setting.discharge_temp_high_2": 55,
+    "setting.discharge_temp_low_1": -15,
+    "setting.discharge_temp_low_2": 0,
+    "setting.cell_difference_1": 450,
+    "setting.cell_difference_2": 500,
+    "setting.temp_difference_1": 10,
+    "setting.temp_difference_2": 15,
+    "setting.soc_low_1": 0.0,
+    "setting.soc_low_2": 0.0,
+}
+
 
 def pack_told(at: float, request: int, *, values: list[int], **more: object) -> Heard:
     shown: dict[str, object] = {
@@ -191,6 +238,33 @@ LIMITS_D2 = [
     *(29900, 29900, 30160, 30160, 85, 85, 40, 40, 110, 110, 39, 39, 255, 255, 255, 255, 3200, 20, 1, 0, 680, 87),
 ]
 """80 to A8."""
+LIMITS_D2_TOLD = {
+    "setting.sleep": 3600,
+    "setting.cell_high_1": 3500,
+    "setting.cell_high_2": 3600,
+    "setting.cell_low_1": 2800,
+    "setting.cell_low_2": 2600,
+    "setting.pack_high_1": 14.0,
+    "setting.pack_high_2": 14.4,
+    "setting.pack_low_1": 10.4,
+    "setting.pack_low_2": 10.0,
+    "setting.charge_current_1": -10.0,
+    "setting.charge_current_2": -10.0,
+    "setting.discharge_current_1": 16.0,
+    "setting.discharge_current_2": 16.0,
+    "setting.charge_temp_high_1": 45,
+    "setting.charge_temp_high_2": 45,
+    "setting.charge_temp_low_1": 0,
+    "setting.charge_temp_low_2": 0,
+    "setting.discharge_temp_high_1": 70,
+    "setting.discharge_temp_high_2": 70,
+    "setting.discharge_temp_low_1": -1,
+    "setting.discharge_temp_low_2": -1,
+    "setting.cell_difference_1": 255,
+    "setting.cell_difference_2": 255,
+    "setting.temp_difference_1": 255,
+    "setting.temp_difference_2": 255,
+}
 VERSION_D2 = [0x3130, 0x5F32, *[0] * 14, *[0] * 16]
 """A9 to C8: "10_2" as sent."""
 
@@ -379,6 +453,35 @@ CASES: dict[str, list[Heard]] = {
         writes(one(0x116, 500, 0x82), 0x116, 500, 1, setting__soc=50.0),
         echoes(one(0x116, 400, 0x52), 0x116, 400, 1.05, request_in=3, write_result="denied"),
         echoes(one(0x116, 400, 0x52), 0x116, 400, 1.1, unasked=True),
+    ],
+    "81: sleep and balance current": [
+        asks(0x115, 3, 0, 0x81),
+        told([360, 805, 1000], 0.1, 0x115, 1, 0x51, also={"setting.sleep": 3600, "setting.soc": 80.5}, **BALANCE),
+        asks(0x115, 1, 1, 0x81),
+        told([0xFFFF], 1.1, 0x115, 3, 0x51, modbus__absent=0x115),  # never
+        writes(one(0x115, 6552, 0x81), 0x115, 6552, 2, setting__sleep=65520),
+        echoes(one(0x115, 6552, 0x51), 0x115, 6552, 2.05, request_in=5, write_result="confirmed"),
+    ],
+    "81: limits, of ess-rsp-0301000051 and ess-rsp-0301510027": [
+        asks(0x130, 32, 0, 0x81),
+        told(LIMITS[:32], 0.1, 0x130, 1, 0x51, also=LIMITS_TOLD),
+        asks(0x150, 24, 1, 0x81),
+        told(LIMITS[32:], 1.1, 0x150, 3, 0x51, also=MORE_LIMITS_TOLD),
+    ],
+    "81: the vendor's app sets the charge current": [
+        Heard(
+            "811001400002743073f02ca9",  # field notes d
+            0,
+            {
+                "direction": 1,
+                "write": True,
+                "modbus.register": 0x140,
+                "modbus.count": 2,
+                "modbus.value": [0x7430, 0x73F0],
+                "setting.charge_current_1": -25.6,
+                "setting.charge_current_2": -32.0,
+            },
+        ),
     ],
     "write many": [
         Heard(
@@ -582,8 +685,8 @@ CASES: dict[str, list[Heard]] = {
             LIMITS_D2,
             0,
             0x80,
+            also=LIMITS_D2_TOLD,
             modbus__assumed=True,
-            setting__cell_high_1=3500,
             setting__mos_charge=True,
             setting__mos_discharge=False,
             setting__soc=68.0,

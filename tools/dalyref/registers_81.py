@@ -8,7 +8,7 @@ Not read, for sources disagree: 3B, 4F-51, 64; for nobody knows the order of the
 
 from __future__ import annotations
 
-from dalyref.quantities import amperes, clock, date, hundreds, number, switch, tenths, text
+from dalyref.quantities import Meaning, amperes, clock, date, hundreds, number, switch, tenths, text
 from dalyref.register_map import RegisterMap, Row, celsius, celsius_not_0, milliamperes_not_0, small
 
 TOLD: tuple[Row, ...] = (
@@ -52,11 +52,26 @@ TOLD: tuple[Row, ...] = (
     (0x199, 0x1A8, "battery_code", text),
 )
 
+
+def _tens_of_seconds(raw: bytes) -> int:
+    return int.from_bytes(raw) * 10
+
+
+def _limit(register: int, name: str, meaning: Meaning) -> tuple[Row, Row]:
+    """Level 1 (warning) and level 2 (protection); return and delay, which follow, have no field."""
+    return (
+        (register, register, f"setting.{name}_1", meaning),
+        (register + 1, register + 1, f"setting.{name}_2", meaning),
+    )
+
+
 SETTINGS: tuple[Row, ...] = (
     (0x100, 0x100, "setting.board_number", number),
     (0x109, 0x10A, "setting.rated_capacity", number),  # mAh
     (0x114, 0x114, "setting.cell_nominal_voltage", number),  # mV
+    (0x115, 0x115, "setting.sleep", _tens_of_seconds),
     (0x116, 0x116, "setting.soc", tenths),  # %
+    (0x117, 0x117, "setting.balance_current", number),  # mA
     (0x119, 0x119, "setting.balancer", switch),
     (0x11A, 0x11A, "setting.balance_start", number),  # mV
     (0x11B, 0x11B, "setting.balance_difference", number),  # mV
@@ -66,6 +81,19 @@ SETTINGS: tuple[Row, ...] = (
     (0x123, 0x125, "clock", clock),
     (0x126, 0x128, "password", text),
     (0x129, 0x12A, "production_date", date),
+    *_limit(0x130, "cell_high", number),  # mV
+    *_limit(0x134, "cell_low", number),
+    *_limit(0x138, "pack_high", tenths),  # V
+    *_limit(0x13C, "pack_low", tenths),
+    *_limit(0x140, "charge_current", amperes),
+    *_limit(0x145, "discharge_current", amperes),
+    *_limit(0x14A, "charge_temp_high", celsius),
+    *_limit(0x14E, "charge_temp_low", celsius),
+    *_limit(0x152, "discharge_temp_high", celsius),
+    *_limit(0x156, "discharge_temp_low", celsius),
+    *_limit(0x15A, "cell_difference", number),  # mV
+    *_limit(0x15E, "temp_difference", number),  # C, no offset
+    *_limit(0x162, "soc_low", tenths),  # %
     (0x16E, 0x16E, "setting.short_circuit_current", number),  # A
 )
 

@@ -56,8 +56,8 @@ setting.soc_high_2 setting.soc_low_1 setting.soc_low_2 setting.cell_difference_1
 setting.temp_difference_1 setting.temp_difference_2 setting.balance_start setting.balance_difference
 setting.short_circuit_current setting.shunt_raw setting.mos_temp_high clock setting.board_number
 setting.acquisition_units setting.heater_start setting.fan_start setting.key_logic setting.balancer
-setting.series_count setting.balance_current_raw setting.inverter setting.inverter_bus setting.mos_charge
-setting.mos_discharge setting.soc command password alarm.level alarm.class alarm.value alarm.delay
+setting.series_count setting.balance_current_raw setting.balance_current setting.inverter setting.inverter_bus
+setting.mos_charge setting.mos_discharge setting.soc command password alarm.level alarm.class alarm.value alarm.delay
 alarm.recovery alarm.recovery_delay alarm.discharge alarm.discharge_delay alarm.charge alarm.charge_delay
 balance.active balance.current_raw balance.position balance.state balance.current wakeup.key wakeup.button
 wakeup.rs485 wakeup.can wakeup.current cell.average_voltage cell.difference temperature.difference power

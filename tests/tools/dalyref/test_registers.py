@@ -246,6 +246,8 @@ def test_ess_settings() -> None:
         "setting.rated_capacity": 314000,
         "setting.cell_nominal_voltage": 3200,
         "setting.soc": 83.4,
+        "setting.sleep": None,  # FFFF: never
+        "setting.balance_current": 1000,
         "setting.balancer": True,
         "setting.balance_start": 3400,
         "setting.balance_difference": 20,

@@ -121,9 +121,9 @@ _TYPES: Final[tuple[tuple[Type, str, str], ...]] = (
         temperature.heater
         """,
     ),
-    ("int32", "s", "setting.sleep"),
+    ("int64", "s", "setting.sleep"),
     ("int32", "A", "setting.short_circuit_current"),
-    ("int32", "mA", "balance.current"),
+    ("int32", "mA", "balance.current setting.balance_current"),
     ("int32", "W", "power"),
     ("int32", "Wh", "energy"),
     ("int64", "mV", "setting.cell_nominal_voltage"),

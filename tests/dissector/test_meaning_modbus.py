@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The table of tests/meaning_modbus.py through the dissector: all of it in one capture, an interface a case."""
+
+from __future__ import annotations
+
+import pytest
+from tests.dissector.dissection import Dissect, P, Row
+from tests.dissector.test_meaning import as_list, plain
+from tests.meaning_modbus import CASES, watched
+
+PACKETS = ("request_in", "late_to", "changed_from", "contradicts")
+"""Numbers of packets, which a case counts from its own first."""
+BY_THE_END = "unanswered"
+"""Depends on how far the capture goes, which here is farther than the case."""
+SIDES = {"": 0, "inbound": 1, "outbound": 2}
+
+
+@pytest.fixture(scope="module")
+def sessions(dissect: Dissect) -> dict[str, tuple[int, list[Row]]]:
+    """Of each case, the packets before it and its rows."""
+    packets = [
+        P(heard.frame, heard.at + 100 * case, case, SIDES[heard.side])
+        for case, name in enumerate(CASES)
+        for heard in CASES[name]
+    ]
+    rows = dissect(packets, descriptions=[f"dalyshark case {case}" for case in range(len(CASES))])
+    taken: dict[str, tuple[int, list[Row]]] = {}
+    before = 0
+    for name, heard in CASES.items():
+        taken[name] = before, rows[before : before + len(heard)]
+        before += len(heard)
+    return taken
+
+
+def wanted(key: str, value: object, before: int) -> list[object]:
+    """What is expected, counted in packets of the whole capture."""
+    return [each + before if key in PACKETS and isinstance(each, float) else each for each in as_list(value)]
+
+
+def as_expected(value: str, expected: list[object]) -> object:
+    """A text where one is expected (a password of digits), else a number where it is one."""
+    truth = {"True": "1", "False": "0"}
+    return value if any(isinstance(each, str) for each in expected) else plain(truth.get(value, value))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_meaning(sessions: dict[str, tuple[int, list[Row]]], name: str) -> None:
+    before, rows = sessions[name]
+    for number, (heard, row) in enumerate(zip(CASES[name], rows, strict=True), 1):
+        expected = {
+            f"daly.{key}": wanted(key, value, before) for key, value in heard.expect.items() if key != BY_THE_END
+        }
+        seen = {
+            field: [as_expected(value, expected.get(field, [])) for value in row[field]]
+            for field in watched(row["daly.dialect"][0])
+            if field in row and field != f"daly.{BY_THE_END}"
+        }
+        assert seen == expected, f"packet {number}"
