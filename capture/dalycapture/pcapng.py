@@ -75,7 +75,9 @@ DIRECTIONS: Final[tuple[Direction, ...]] = ("", "inbound", "outbound", "")
 
 _SECTION = struct.Struct("<IHHq")
 _INTERFACE = struct.Struct("<HHI")
-_PACKET = struct.Struct("<IIIII")
+_PACKET = struct.Struct("<IIIIIII")
+_TOTAL = struct.Struct("<I")
+_PADDING = (b"", bytes(3), bytes(2), bytes(1))  # by the length's last two bits
 _STATISTICS = struct.Struct("<III")
 
 
@@ -143,8 +145,11 @@ class PcapngWriter(CaptureWriter):
                 _option(EPB_DROPCOUNT, struct.pack("<Q", dropped)) if dropped else b"",
                 _text(COMMENT, comment),
             )
-        head = _PACKET.pack(interface, time_ns >> 32, time_ns & 0xFFFFFFFF, len(data), len(data))
-        return _block(ENHANCED_PACKET, head + _padded(data) + options)
+        size = len(data)
+        padding = _PADDING[size & 3]
+        total = _PACKET.size + size + len(padding) + len(options) + _TOTAL.size
+        head = _PACKET.pack(ENHANCED_PACKET, total, interface, time_ns >> 32, time_ns & 0xFFFFFFFF, size, size)
+        return b"".join((head, data, padding, options, _TOTAL.pack(total)))
 
     def write_statistics(
         self, interface: int, *, start_ns: int, end_ns: int, received: int, dropped: int, os_dropped: int = 0

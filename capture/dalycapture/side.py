@@ -61,7 +61,8 @@ class Side:
         self.tally = SideTally(port.name)
         self.rest_until_ns = 0  # the port need not be looked at before
         self._settings = settings or Settings(interface.speed or 9600)
-        self._direction = DIRECTIONS.get(name, 0)
+        direction = DIRECTIONS.get(name, 0)
+        self._flags = {kind: direction | ERROR_FLAGS.get(kind, 0) for kind in Kind}
         self._wait_s = wait_s
         self._port: Port | None = port
         self._name = port.name
@@ -189,11 +190,12 @@ class Side:
     def flags_and_losses(self, timed: TimedRecord) -> tuple[int, int]:
         """Return epb_flags of a record, and how many bytes were lost before it. Records are asked for in order."""
         record = timed.record
-        flags = self._direction | ERROR_FLAGS.get(record.kind, 0)
-        end = record.start + len(record.data)
-        while self._errors and self._errors[0] < end:
-            self._errors.popleft()
-            flags |= SYMBOL_ERROR
+        flags = self._flags[record.kind]
+        if self._errors:
+            end = record.start + len(record.data)
+            while self._errors and self._errors[0] < end:
+                self._errors.popleft()
+                flags |= SYMBOL_ERROR
         dropped, self._dropped = self._dropped, 0
         return flags, dropped
 

@@ -234,10 +234,11 @@ class Sniffer:
         limits = self._limits
         if limits.packets is not None and self.tally.records >= limits.packets:
             return End.PACKETS
-        if limits.filesize is not None and any(sink.output.size >= limits.filesize for sink in self._sinks):
-            return End.FILESIZE
-        if any(sink.complete for sink in self._sinks):
-            return End.FILES
+        for sink in self._sinks:
+            if limits.filesize is not None and sink.output.size >= limits.filesize:
+                return End.FILESIZE
+            if sink.complete:
+                return End.FILES
         return None
 
     def _on_port(self, side: Side, now: int, late: int) -> None:
@@ -312,27 +313,40 @@ class Sniffer:
 
     def _write(self, items: Iterable[TimedRecord | Event]) -> None:
         """Write records and events to all sinks, up to a limit: what comes behind it is not part of the capture."""
-        todo = deque(items)
-        while todo:
-            item = todo.popleft()
+        todo = list(items)
+        offset_ns = self._clock.offset_ns
+        for done, item in enumerate(todo, 1):
             if isinstance(item, Event):
                 self._write_event(item)
                 continue
             if self._limit():
                 break
-            timed = replace(item, time_ns=self._clock.time_ns(item.time_ns))
-            side = self._sides[timed.side]
-            flags, dropped = side.flags_and_losses(timed)
-            comment = _bound(timed) if self._verbose else ""
+            time_ns = item.time_ns + offset_ns
+            side = self._sides[item.side]
+            flags, dropped = side.flags_and_losses(item)
+            comment = _bound(item) if self._verbose else ""
             try:
-                for sink in tuple(self._sinks):
-                    self._to(sink, functools.partial(_put, timed, flags, dropped, comment))
+                self._put(item, time_ns, flags, dropped, comment)
             except CaptureError:
-                self._give_up(sum(isinstance(one, TimedRecord) for one in todo))
-            self.tally.add(timed)
+                self._give_up(sum(isinstance(one, TimedRecord) for one in todo[done:]))
+            side.tally.add(item)
             if self._listener:
-                self._listener(timed)
+                self._listener(replace(item, time_ns=time_ns))
         self._end = self._end or self._limit()
+
+    def _put(self, timed: TimedRecord, time_ns: int, flags: int, dropped: int, comment: str) -> None:
+        """Write a record to all sinks, with the time of day."""
+        data, side = timed.record.data, timed.side
+        gone: list[tuple[CaptureWriter, str]] = []
+        for sink in self._sinks:
+            try:
+                sink.write_packet(time_ns, data, interface=side, flags=flags, comment=comment, dropped=dropped)
+            except CaptureError as error:
+                if not isinstance(sink.failure, BrokenPipeError):
+                    raise
+                gone.append((sink, str(error)))
+        for sink, note in gone:
+            self._let_go(sink, note)
 
     def _write_event(self, event: Event) -> None:
         self.tally.events += 1
@@ -415,11 +429,6 @@ class Sniffer:
 
 def _describe(side: Side, sink: CaptureWriter) -> None:
     sink.add_interface(side.interface)
-
-
-def _put(timed: TimedRecord, flags: int, dropped: int, comment: str, sink: CaptureWriter) -> None:
-    data = timed.record.data
-    sink.write_packet(timed.time_ns, data, interface=timed.side, flags=flags, comment=comment, dropped=dropped)
 
 
 def _bound(timed: TimedRecord) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -16,7 +15,8 @@ if TYPE_CHECKING:
     from dalycapture.framing import TimedRecord
     from dalycapture.line import Counts
 
-_STEPS_PER_E: Final = 20  # buckets of 5 %
+_STEP_BITS: Final = 5  # a bucket for each 32nd of an octave: 3 % at most
+_LEAST_NS: Final = 1000
 MOST_GAPS: Final = 1000  # that are kept one by one
 LAST_BOARD: Final = 16
 
@@ -34,7 +34,7 @@ class End(StrEnum):
 
 
 class Spread:
-    """How some times are spread: quantiles to 5 %, in memory that does not grow."""
+    """How some times are spread: quantiles to 3 %, in memory that does not grow."""
 
     def __init__(self) -> None:
         self.largest_ns = 0
@@ -45,7 +45,9 @@ class Spread:
         """Take one."""
         self.count += 1
         self.largest_ns = max(self.largest_ns, ns)
-        self._buckets[math.ceil(math.log(max(ns, 1000)) * _STEPS_PER_E)] += 1
+        ns = max(ns, _LEAST_NS)
+        coarse = ns.bit_length() - _STEP_BITS - 1
+        self._buckets[(coarse << _STEP_BITS + 1) + (ns >> coarse)] += 1
 
     def quantile_ms(self, share: float) -> float:
         """Return the time that this share of them does not exceed, in ms; 0 where there was none."""
@@ -53,7 +55,8 @@ class Spread:
         for bucket, count in sorted(self._buckets.items()):
             left -= count
             if left <= 0:
-                return min(math.exp(bucket / _STEPS_PER_E), self.largest_ns) / 1e6
+                coarse, fine = divmod(bucket, 1 << _STEP_BITS + 1)
+                return min((fine + 1) << coarse, self.largest_ns) / 1e6
         return 0.0
 
 
@@ -65,6 +68,7 @@ class SideTally:
     bytes: int = 0
     records: int = 0
     kinds: KindCounts = field(default_factory=KindCounts)
+    boards: set[int] = field(default_factory=set[int])  # that answered in the A5 dialect
     marked: int = 0  # bytes marked as received with an error
     breaks: int = 0
     counts: Counts | None = None  # what the driver has counted since the capture began; None: it does not count
@@ -81,10 +85,14 @@ class SideTally:
 
     def add(self, timed: TimedRecord) -> None:
         """Count a record."""
+        record = timed.record
         self.records += 1
-        self.kinds[timed.record.kind] += 1
+        self.kinds[record.kind] += 1
         self.bounds.add(timed.bound_ns)
-        self.contradictory += not timed.consistent
+        if not timed.consistent:
+            self.contradictory += 1
+        if record.kind is Kind.FRAME and record.dialect is Dialect.A5 and 1 <= record.data[1] <= LAST_BOARD:
+            self.boards.add(record.data[1])
 
     def gap(self, seconds: float) -> None:
         """Count a time without the port."""
@@ -119,13 +127,10 @@ class SideTally:
 class Tally:
     """What a capture has heard so far."""
 
-    records: int = 0
-    kinds: KindCounts = field(default_factory=KindCounts)
     seconds: float = 0.0
     end: End = End.STOPPED
     problem: str = ""  # one line, when the port was lost
     notes: list[str] = field(default_factory=list[str])  # pipes that broke or fell behind
-    boards: set[int] = field(default_factory=set[int])  # that answered in the A5 dialect
     events: int = 0
     marks: int = 0  # the user's
     clock_steps: int = 0
@@ -137,6 +142,24 @@ class Tally:
     def bytes(self) -> int:
         """Bytes heard."""
         return sum(side.bytes for side in self.sides)
+
+    @property
+    def records(self) -> int:
+        """Records that were written."""
+        return sum(side.records for side in self.sides)
+
+    @property
+    def kinds(self) -> KindCounts:
+        """Records of each kind."""
+        kinds = KindCounts()
+        for side in self.sides:
+            kinds.update(side.kinds)
+        return kinds
+
+    @property
+    def boards(self) -> set[int]:
+        """Boards that answered in the A5 dialect."""
+        return set[int]().union(*(side.boards for side in self.sides))
 
     @property
     def good(self) -> int:
@@ -157,15 +180,6 @@ class Tally:
     def lost(self) -> int:
         """Records that no file has, and bytes that were lost before us."""
         return self.unwritten + sum(side.lost for side in self.sides)
-
-    def add(self, timed: TimedRecord) -> None:
-        """Count a record."""
-        record = timed.record
-        self.records += 1
-        self.kinds[record.kind] += 1
-        self.sides[timed.side].add(timed)
-        if record.kind is Kind.FRAME and record.dialect is Dialect.A5 and 1 <= record.data[1] <= LAST_BOARD:
-            self.boards.add(record.data[1])
 
     def as_json(self) -> dict[str, Any]:
         """Lay out for --stats."""

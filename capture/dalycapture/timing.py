@@ -22,12 +22,15 @@ byte says is used.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     from dalycapture.port import Latency
 
 CLOCK_TOLERANCE: Final = 0.01  # of a UART's bit clock
+FASTEST: Final = 1 - CLOCK_TOLERANCE
 MOST_LEARNED_NS: Final = 50_000_000
 HALF_BIT: Final = 0.05  # of a byte: a UART hands a byte over in the middle of its stop bit
 USUAL_NS: Final = 50_000  # from a byte in the kernel to our clock: 30 us on a busy processor, 130 on one that slept
@@ -41,7 +44,8 @@ class Estimate(NamedTuple):
     consistent: bool
 
 
-class _Read(NamedTuple):
+@dataclass(slots=True)
+class _Read:
     """One read: its bytes begin and end at these offsets of the stream; it returned at time_ns.
 
     usual_ns: its bytes had come so long before, usually. floor_ns: its first byte did not end before. mail_ns: nor did
@@ -128,20 +132,26 @@ class Timing:
             reads.popleft()
         first = reads[0]
         zero = last_ns = first.time_ns  # all below is relative to it: floating point has no room for 1970
-        high = highest = float("inf")
-        low = lowest = float("-inf")
+        high = highest = inf
+        low = lowest = -inf
+        # Written out, for this is done for every record: a call of min or max costs as much as all else in its line.
         for read in reads:
             if read.begin >= end:
                 break
             last_ns = read.time_ns
             span = (read.end - start) * c
-            high = min(high, read.time_ns - read.usual_ns - zero - span)
-            highest = min(highest, read.time_ns - zero - span * (1 - CLOCK_TOLERANCE))
+            if (ended := last_ns - read.usual_ns - zero - span) < high:
+                high = ended
+            if (ended := last_ns - zero - span * FASTEST) < highest:
+                highest = ended
             span = (read.begin - start + 1) * c
-            low = max(low, read.floor_ns - zero - span)
-            lowest = max(lowest, read.floor_ns - zero - span - abs(span) * CLOCK_TOLERANCE)
+            began = read.floor_ns - zero - span
+            low = max(low, began)
+            if (began := began - abs(span) * CLOCK_TOLERANCE) > lowest:
+                lowest = began
         highest += HALF_BIT * c
-        lowest = max(lowest, self._free_floor_ns - zero)
+        if (free := self._free_floor_ns - zero) > lowest:
+            lowest = free
         consistent = lowest <= highest
         if not consistent:  # the sender paused, or the adapter holds bytes back longer than it says
             if self._learns and not self._told_ns:  # a pseudo-terminal, whose writer was late himself
@@ -149,11 +159,19 @@ class Timing:
             low = lowest = first.floor_ns - zero - (first.begin - start + 1) * c
             if lowest > highest:  # it did hold this byte back longer, by so much at least
                 lowest = highest - (lowest - highest) - self.delay_ns
-        best = high - max(0.0, min(high - low, float(self._told_ns))) / 2
-        start_ns = min(max(zero + round(best), self._free_ns), first.time_ns)
-        bound_ns = round(max(highest - (start_ns - zero), start_ns - zero - lowest, 0.0))
-        self._free_ns = min(start_ns + round(length * c), last_ns)
-        self._free_floor_ns = min(zero + round(lowest + length * c * (1 - CLOCK_TOLERANCE)), last_ns)
+        if (spread := high - low) > self._told_ns:
+            spread = self._told_ns
+        best = round(high - spread / 2 if spread > 0 else high)
+        if best < (free := self._free_ns - zero):
+            best = free
+        best = min(best, 0)
+        bound = highest - best
+        bound = max(bound, best - lowest)
+        span = length * c
+        free = zero + best + round(span)
+        self._free_ns = free if free < last_ns else last_ns
+        free = zero + round(lowest + span * FASTEST)
+        self._free_floor_ns = free if free < last_ns else last_ns
         while reads and reads[0].end <= end:
             reads.popleft()
-        return Estimate(start_ns, bound_ns, consistent)
+        return Estimate(zero + best, round(bound) if bound > 0 else 0, consistent)

@@ -141,7 +141,7 @@ class CaptureWriter(ABC):
         side.dropped += dropped
         records = 1 if data else 0
         side.received += records
-        if self._pay(records) and self._tell_full(time_ns, records):
+        if (not self._owed or self._pay(records)) and (self._full is None or self._tell_full(time_ns, records)):
             block = self._packet(time_ns, data, interface=interface, flags=flags, comment=comment, dropped=side.dropped)
             if self._write(block, records):
                 self.written += records

@@ -26,9 +26,12 @@ class Dialect(StrEnum):
     P81 = "81"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Record:
-    """A piece of a stream. The records of a stream, in order, put together, are the stream."""
+    """A piece of a stream. The records of a stream, in order, put together, are the stream.
+
+    Not to be changed; frozen, it would cost four times as much to make.
+    """
 
     start: int
     """Offset of the first byte in the stream."""

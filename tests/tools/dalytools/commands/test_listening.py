@@ -154,10 +154,9 @@ def test_options_that_can_not_be(words: list[str], message: str, capsys: pytest.
 
 
 def test_the_status_line() -> None:
-    tally = Tally(
-        seconds=72, written=1_234_567, unwritten=3, boards={2, 1}, sides=[SideTally("a", counts=Counts(overrun=2))]
-    )
-    tally.kinds.update({Kind.FRAME: 20, Kind.SHORT: 1, Kind.JUNK: 2})
+    side = SideTally("a", boards={2, 1}, counts=Counts(overrun=2))
+    side.kinds.update({Kind.FRAME: 20, Kind.SHORT: 1, Kind.JUNK: 2})
+    tally = Tally(seconds=72, written=1_234_567, unwritten=3, sides=[side])
     assert status_text(tally, 7.25) == "1:12  7.2 records/s  20 good, 1 bad, 2 junk  boards 1 2  1.2 MB  5 lost"
     tally.sides[0].away = True
     assert status_text(tally, 0).endswith("  5 lost  waiting for a")
