@@ -11,7 +11,7 @@ import sys
 import zlib
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from dalycapture import candump
 from dalycapture.btsnoop import MAGIC as _BTSNOOP
@@ -24,6 +24,7 @@ from dalycapture.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
+    from io import BufferedReader
 
     from dalycapture.captured import CapturedPacket, Told
 
@@ -59,7 +60,10 @@ def opened(path: Path | str) -> Generator[Source]:
     name = "standard input" if str(path) == "-" else str(path)
     with ExitStack() as stack:
         try:
-            stream = sys.stdin.buffer if str(path) == "-" else stack.enter_context(Path(path).open("rb"))
+            if str(path) == "-":
+                stream = cast("BufferedReader", sys.stdin.buffer)
+            else:
+                stream = stack.enter_context(Path(path).open("rb"))
             yield Source(stream, name)
         except FileNotFoundError:
             raise CaptureError(f"{name}: there is no such file") from None

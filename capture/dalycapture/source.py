@@ -10,10 +10,14 @@ if TYPE_CHECKING:
 
 
 class Readable(Protocol):
-    """What is needed of a file: ``read(n)`` gives n bytes, less only at its end."""
+    """What is needed of a file: ``read(n)`` gives n bytes, less only at its end; ``readinto`` the same."""
 
     def read(self, size: int, /) -> bytes:
         """Read up to size bytes."""
+        ...
+
+    def readinto(self, buffer: memoryview, /) -> int:
+        """Fill a buffer; return how many bytes that took."""
         ...
 
 
@@ -37,6 +41,15 @@ class Source:
             data = self._stream.read(size)
         self.offset += len(data)
         return data
+
+    def read_into(self, buffer: memoryview, /) -> int:
+        """Fill a buffer with the next bytes; return how many there are, less only at the end."""
+        ahead = self._ahead[: len(buffer)]
+        self._ahead = self._ahead[len(ahead) :]
+        buffer[: len(ahead)] = ahead
+        size = len(ahead) + self._stream.readinto(buffer[len(ahead) :])
+        self.offset += size
+        return size
 
     def peek(self, size: int) -> bytes:
         """Look at the next bytes without taking them; less only at the end."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import io
 import struct
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -20,23 +20,26 @@ from dalycapture.errors import CaptureError
 from dalycapture.file_numbers import BYTE_ORDER_MAGIC, ENHANCED_PACKET, MAX_BLOCK
 from dalycapture.pcapng import PcapngReader
 from dalycapture.source import Source
-from dalytools.bulk.packets import SPARE, Gathered, Packets
+from dalytools.bulk.equal import repeated
+from dalytools.bulk.packets import SPARE, Gathered, Packets, gather
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from dalycapture.captured import Told
-    from dalytools.bulk.arrays import Bytes, Flags, Ints, Words32
+    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints, Words, Words32
     from dalytools.bulk.packets import Interfaces
 
-CHUNK: Final = 1 << 20
-"""Bytes read at a time."""
+CHUNK: Final = 2 << 20
+"""Bytes read at a time: of less, what is done once for each costs more; more does not stay in the processor's cache."""
 _HEAD: Final = 7
 """Words of a packet block before its data."""
 _LEAST: Final = 8
 """Words of a packet block without data."""
 _FLAGS: Final = 2 | 4 << 16
 """Code and length of the option, as one little-endian word."""
+_FIRST_GUESS: Final = 64
+"""So many blocks are looked at first when they are unlike those before."""
 _SHORT_RUN: Final = 16
 _WALKED: Final = 128
 """So many blocks are walked one by one after a short run."""
@@ -51,27 +54,35 @@ class BlockReader:
         self._interfaces = interfaces
         self._reader = PcapngReader(source, told)
         self._chunk = chunk
-        self._parts: list[tuple[Ints, ...]] = []
+        self._parts: list[_Part] = []
         self._rows = Gathered()
-        self._extra = bytearray()
+        self._extra = bytearray()  # data of packets that the plain reader read
+        self._extra_at = 0
         self._comments: dict[int, str] = {}
-        self._data = b""  # the chunk at hand
+        self._buffer: Bytes = np.zeros(0, np.uint8)  # used again for each chunk
+        self._data = memoryview(b"")  # the chunk at hand
         self._start = 0  # its first byte's offset in the file
+        self._guess = _FIRST_GUESS
 
     def packets(self) -> Iterator[Packets]:
-        """Yield the packets, some at a time. Raises what ``read_pcapng`` raises, after the packets before."""
-        left = b""
+        """Yield the packets, some at a time: their `buffer` is written over when the next are asked for.
+
+        Raises what ``read_pcapng`` raises, after the packets before.
+        """
+        left = 0
         while True:
-            more = self._source.read(self._chunk)
-            self._start = self._source.offset - len(more) - len(left)
-            self._data = left + more
+            self._make_room(left)
+            more = self._source.read_into(self._buffer.data[left : left + self._chunk])
+            size = left + more
+            self._start = self._source.offset - size
+            self._data = self._buffer.data[:size]
             problem: CaptureError | None = None
             done = 0
             try:
                 done = self._walk()
-                if not more and done < len(self._data):
-                    self._plain(done, len(self._data))  # says how it is cut off
-                    done = len(self._data)
+                if not more and done < size:
+                    self._plain(done, size)  # says how it is cut off
+                    done = size
             except CaptureError as error:
                 problem = error
             packets = self._collected()
@@ -81,21 +92,27 @@ class BlockReader:
                 raise problem
             if not more:
                 return
-            left = self._data[done:]
+            left = size - done
+            self._buffer[:left] = self._buffer[done:size]
+
+    def _make_room(self, left: int) -> None:
+        """See to it that a chunk fits into the buffer behind what is left of the one before."""
+        room = left + self._chunk
+        self._extra_at = room + -room % 4
+        if len(self._buffer) < self._extra_at + SPARE:
+            larger = np.zeros(self._extra_at + SPARE + left, np.uint8)  # a long block takes more than one chunk
+            larger[:left] = self._buffer[:left]
+            self._buffer = larger
 
     def _walk(self) -> int:
         """Take all blocks of the chunk that are whole; return the offset of the first that is not."""
-        data = self._data
-        words = np.frombuffer(data, "<u4", len(data) // 4)
+        words: Words32 = self._buffer[: len(self._data) // 4 * 4].view("<u4")
         if self._reader.order == ">":
             words = words.byteswap()
         end = len(words)
         at = 0
         while at + 3 <= end:
-            stop, starts = self._packet_blocks(words, at)
-            if starts is not None:
-                self._take(words, starts)
-            at = stop
+            at = self._packet_blocks(words, at)
             if at + 3 > end:
                 break
             size = self._size(at)
@@ -115,11 +132,11 @@ class BlockReader:
             total = int.from_bytes(total.to_bytes(4, "little"), "big")
         return total // 4 if 12 <= total <= MAX_BLOCK and total % 4 == 0 else 3
 
-    def _packet_blocks(self, words: Words32, at: int) -> tuple[int, Ints | None]:
-        """Find packet blocks that follow each other from word `at` on: (the word behind them, where they begin)."""
+    def _packet_blocks(self, words: Words32, at: int) -> int:
+        """Take packet blocks that follow each other from word `at` on; return the word behind them."""
         found: list[Ints] = []
         end = len(words)
-        guess = 64
+        guess = self._guess
         look = words.data
         while at + _LEAST <= end and look[at] == ENHANCED_PACKET:
             total = look[at + 1]
@@ -129,23 +146,73 @@ class BlockReader:
             count = min((end - at) // size, guess)
             if not count:
                 break
-            rows = words[at : at + count * size].reshape(count, size)
-            alike = (rows[:, 0] == ENHANCED_PACKET) & (rows[:, 1] == total) & (rows[:, -1] == total)
+            # Type and length are one number of 64 bits.
+            heads = np.ndarray((count,), np.uint64, words, 4 * at, (total,)).copy()
+            alike = heads == (ENHANCED_PACKET | total << 32)
+            alike &= words[at + size - 1 : at + count * size : size] == total
             run = count if alike.all() else int(alike.argmin())
-            if not run:
-                break
-            found.append(np.arange(at, at + run * size, size))
-            at += run * size
-            if run == count:
-                guess = min(guess * 8, 1 << 20)
-            elif run >= _SHORT_RUN:
-                guess = 64
-            else:
+            guess = min(guess * 8, 1 << 20) if run == count else _FIRST_GUESS
+            if run < _SHORT_RUN:
                 at, starts = _walked(look, at, _WALKED)
+                if not starts:
+                    break
                 found.append(np.array(starts, np.int64))
-        if not found:
-            return at, None
-        return at, found[0] if len(found) == 1 else np.concatenate(found)
+                continue
+            if found or not self._take_run(words, at, run, size):
+                found.append(np.arange(at, at + run * size, size))
+            at += run * size
+        self._guess = guess
+        if found:
+            self._take(words, found[0] if len(found) == 1 else np.concatenate(found))
+        return at
+
+    def _take_run(self, words: Words32, at: int, count: int, size: int) -> bool:
+        """Take packet blocks of one size, if in all of them what stands before and behind the data has one form."""
+        reader = self._reader
+        sides = reader.sides
+        rows = words[at : at + count * size].reshape(count, size)
+        length = int(rows[0, 5])
+        options = _HEAD + ((length + 3) >> 2)
+        left = size - 1 - options
+        if left < 0 or not sides or not (rows[:, 5] == length).all():
+            return False
+        number = int(rows[0, 2])
+        one = bool((rows[:, 2] == number).all())
+        if one and number < len(sides):
+            side = sides[number]
+            interface = repeated(side.number, count)
+        else:
+            if rows[:, 2].max() >= len(sides):
+                return False
+            interface = np.array([side.number for side in sides], np.int64)[rows[:, 2]]
+        if any(side.resolution != 9 or side.offset_s for side in ([sides[number]] if one else sides)):
+            return False
+        # The halves of the time stand the other way round.
+        ticks = np.ndarray((count,), np.uint64, words, 4 * (at + 3), (4 * size,)).copy()
+        high = ticks << np.uint64(32)
+        ticks >>= np.uint64(32)
+        ticks |= high
+        if ticks.max() >= 1 << 61:  # else the time may be too large for us
+            return False
+        flags = repeated(0, count)
+        if left:
+            if reader.order == ">" or left != 3 or not (rows[:, options] == _FLAGS).all():
+                return False
+            if (rows[:, options + 2] & 0xFFFF).any():
+                return False
+            flags = (rows[:, options + 1] & 3).astype(np.int64)
+            flags[flags == 3] = 0
+        offset = np.arange(4 * (at + _HEAD), 4 * (at + _HEAD + count * size), 4 * size)
+        self._add((ticks.view(np.int64), interface, flags, offset, repeated(length, count)))
+        return True
+
+    def _add(self, columns: tuple[Ints, ...]) -> None:
+        """Take time, interface, side, offset and length of packets that follow each other."""
+        self._close_rows()
+        _, _, _, offset, _ = columns
+        number = np.arange(self._reader.number + 1, self._reader.number + 1 + len(offset))
+        self._parts.append(_Part((number, *columns), gather(self._buffer, offset)))
+        self._reader.number += len(offset)
 
     def _take(self, words: Words32, starts: Ints) -> None:
         """Take packet blocks whose sizes are right."""
@@ -186,10 +253,7 @@ class BlockReader:
         begin = 0
         for odd in (*np.flatnonzero(~good).tolist(), len(starts)):
             if odd > begin:
-                self._close_rows()
-                number = np.arange(reader.number + 1, reader.number + 1 + odd - begin)
-                self._parts.append((number, *(column[begin:odd] for column in columns)))
-                reader.number += odd - begin
+                self._add(tuple(column[begin:odd] for column in columns))
             if odd < len(starts):
                 self._plain(4 * int(starts[odd]), 4 * int(starts[odd] + sizes[odd]))
             begin = odd + 1
@@ -219,7 +283,7 @@ class BlockReader:
         self._reader.source = source
         try:
             for packet in self._reader.packets():
-                self._rows.add(packet, len(self._data) + -len(self._data) % 4 + len(self._extra))
+                self._rows.add(packet, self._extra_at + len(self._extra))
                 self._extra += packet.data + bytes(-len(packet.data) % 4)
                 if packet.comment:
                     self._comments[packet.number] = packet.comment
@@ -233,8 +297,11 @@ class BlockReader:
     def _close_rows(self) -> None:
         rows = self._rows
         if rows.number:
+            offset = np.array(rows.offset, np.int64)
+            extra = np.frombuffer(bytes(self._extra) + bytes(SPARE), np.uint8)
             columns = (rows.number, rows.time_ns, rows.interface, rows.side, rows.offset, rows.length)
-            self._parts.append(tuple(np.array(column, np.int64) for column in columns))
+            words = gather(extra, offset - self._extra_at)
+            self._parts.append(_Part(tuple(np.array(column, np.int64) for column in columns), words))
             self._rows = Gathered()
 
     def _collected(self) -> Packets:
@@ -242,16 +309,29 @@ class BlockReader:
         self._close_rows()
         parts, comments = self._parts, self._comments
         columns: tuple[Ints, ...] = (np.zeros(0, np.int64),) * 6
+        words = np.zeros((0, 2), np.uint64)
         if parts:
-            columns = (
-                parts[0] if len(parts) == 1 else tuple(np.concatenate(column) for column in zip(*parts, strict=True))
-            )
-        data = self._data
-        buffer: Bytes = np.frombuffer(data + bytes(-len(data) % 4) + bytes(self._extra) + bytes(SPARE), np.uint8)
+            columns = tuple(_joined(column) for column in zip(*(part.columns for part in parts), strict=True))
+            words = _joined([part.words for part in parts])
+        buffer = self._buffer[: self._extra_at + SPARE]
+        if self._extra:
+            extra = np.frombuffer(bytes(self._extra) + bytes(SPARE), np.uint8)
+            buffer = np.concatenate((buffer[: self._extra_at], extra))
         self._parts, self._comments = [], {}
         self._extra.clear()
         number, time_ns, interface, side, offset, length = columns
-        return Packets(buffer, number, time_ns, interface, side.astype(np.uint8), offset, length, comments)
+        return Packets(buffer, number, time_ns, interface, side.astype(np.uint8), offset, length, words, comments)
+
+
+class _Part(NamedTuple):
+    """Some packets: number, time, interface, side, offset, length; and the first sixteen bytes of each."""
+
+    columns: tuple[Ints, ...]
+    words: Words
+
+
+def _joined(arrays: Sequence[Array]) -> Array:
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _walked(look: memoryview, at: int, most: int) -> tuple[int, list[int]]:

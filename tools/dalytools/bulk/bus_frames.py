@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from dalyref import addresses, bursts
-from dalytools.bulk.frames import FIVE
 
 if TYPE_CHECKING:
     from dalytools.bulk.arrays import Bytes, Flags, Ints, Words
@@ -55,7 +54,7 @@ class BusFrames:
             self.end_ns[which],
             self.latest_ns[which],
             self.side[which],
-            self.words[which],
+            part_of(self.words, which),
             self.direction[which],
             self.answers[which],
         )
@@ -75,10 +74,6 @@ class BusFrames:
             np.concatenate((earlier.answers, self.answers)),
         )
 
-    def identity(self) -> tuple[Words, Words]:
-        """Return two numbers a row that are equal where frames are equal."""
-        return self.words[:, 0], self.words[:, 1] & FIVE
-
     def bytes_of(self, at: int) -> bytes:
         """Return the thirteen bytes of one frame."""
         return self.words[at].tobytes()[:13]
@@ -91,6 +86,11 @@ def risen(values: Ints, least: int) -> Ints:
     return np.maximum.accumulate(np.maximum(values, least))
 
 
+def part_of(words: Words, which: slice | Ints | Flags) -> Words:
+    """Return some rows: sixteen bytes each are quicker to pick than two numbers each."""
+    return words.view("V16")[:, 0][which].view(np.uint64).reshape(-1, 2)
+
+
 def rows_of(words: Words, which: Ints) -> Bytes:
     """Return the sixteen bytes of some frames."""
     return words.view("V16")[:, 0][which].view(np.uint8).reshape(*which.shape, 16)
@@ -98,4 +98,5 @@ def rows_of(words: Words, which: Ints) -> Bytes:
 
 def first_direction(address: Bytes) -> Bytes:
     """Return request or reply by the address byte: an echo is a request so far."""
-    return np.where(address >= addresses.FIRST_HOST, addresses.REQUEST, addresses.REPLY).astype(np.uint8)
+    host = (address >= addresses.FIRST_HOST).view(np.uint8)
+    return np.uint8(addresses.REPLY) - host * np.uint8(addresses.REPLY - addresses.REQUEST)

@@ -19,7 +19,8 @@ from dalyref import bursts, cells
 from dalyref.addresses import ECHO, REPLY, REQUEST
 from dalyref.exchange import Exchange
 from dalyref.message import from_serial
-from dalytools.bulk.bus_frames import BOARD, IS_BURST, ONLY, risen
+from dalytools.bulk.bus_frames import BOARD, IS_BURST, ONLY, part_of, risen
+from dalytools.bulk.frames import FIVE
 from dalytools.bulk.packets import SIDES
 from dalytools.bulk.runs import Running, judge
 from dalytools.bulk.unlike import UnlikeError
@@ -43,29 +44,37 @@ class Directions:
         self._echo_ns = options.limit_ns(options.echo)
         self._burst_ns = options.limit_ns(options.burst)
 
-    def find(self, frames: BusFrames, known: int, running: Running) -> None:
-        """Set `direction` of the frames behind the first `known`, whose directions are known.
+    def find(self, before: BusFrames, frames: BusFrames, running: Running) -> None:
+        """Set `direction` of frames, given those before them.
 
-        running: the reply before the frames behind the known ones.
+        running: the reply before the frames.
         """
-        doubtful, before = self._same_again(frames, known)
+        doubtful, same = self._same_again(before, frames)
         if not len(doubtful):
             return
-        verdict = self._by_neighbours(frames, known, doubtful, before)
-        frames.direction[doubtful] = np.where(verdict == ECHO, ECHO, REQUEST)
+        known = len(before)
+        both = frames.behind(before)
+        verdict = self._by_neighbours(both, known, doubtful, same)
+        both.direction[doubtful] = np.where(verdict == ECHO, ECHO, REQUEST)
         open_questions = doubtful[verdict == _UNKNOWN]
         if len(open_questions):
-            self._by_the_book(frames, known, open_questions, running)
+            self._by_the_book(both, known, open_questions, running)
+        frames.direction = both.direction[known:]
 
-    def _same_again(self, frames: BusFrames, known: int) -> tuple[Ints, Ints]:
-        """Return new requests that may be echoes, and for each the same one before it."""
-        at = np.flatnonzero(frames.direction != REPLY)
+    def _same_again(self, before_them: BusFrames, frames: BusFrames) -> tuple[Ints, Ints]:
+        """Return new requests that may be echoes, and for each the same one before it: counted over both."""
+        known = len(before_them)
+        earlier, later = (np.flatnonzero(each.direction != REPLY) for each in (before_them, frames))
+        at = np.concatenate((earlier, known + later))
         if len(at) < 2:
             return at[:0], at[:0]
-        first, second = (half[at] for half in frames.identity())
-        start_ns = frames.start_ns[at]
-        latest_end_ns = risen(frames.end_ns[at], 0)
-        window_ns = self._wait_ns if frames.side[at].any() else self._echo_ns
+        parts = ((before_them, earlier), (frames, later))
+        start_ns = np.concatenate([each.start_ns[rows] for each, rows in parts])
+        latest_end_ns = risen(np.concatenate([each.end_ns[rows] for each, rows in parts]), 0)
+        words = np.concatenate([part_of(each.words, rows) for each, rows in parts])
+        both_sides = any(each.side[rows].any() for each, rows in parts)
+        first, second = words[:, 0], words[:, 1]
+        window_ns = self._wait_ns if both_sides else self._echo_ns
         before = np.full(len(at), -1, np.int64)
         step = 1
         while step < len(at):
@@ -74,8 +83,9 @@ class Directions:
                 break
             if step > _MOST_STEPS:
                 raise UnlikeError("hundreds of requests in a moment")
-            near &= (first[step:] == first[:-step]) & (second[step:] == second[:-step])
+            near &= first[step:] == first[:-step]
             here = np.flatnonzero(near) + step
+            here = here[(second[here] ^ second[here - step]) & FIVE == 0]
             here = here[before[here] < 0]
             before[here] = here - step
             step += 1

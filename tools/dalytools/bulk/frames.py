@@ -21,15 +21,16 @@ from dalyref.kinds import Kind
 from dalyref.records import Splitter
 
 if TYPE_CHECKING:
-    from dalytools.bulk.arrays import Bytes, Flags, Ints, Words
+    from dalytools.bulk.arrays import Bytes, Flags, Ints, Words, Words64
 
 _U = np.uint64
-_START: Final = _U(0x0000_0000_FF00_00FF)
-_A5_08: Final = _U(0x0000_0000_0800_00A5)
+_U8 = np.uint8
+_START: Final = np.uint32(0xFF00_00FF)
+_A5_08: Final = np.uint32(0x0800_00A5)
+_FIXED: Final = _U8(0xA5 + 0x08)
+"""What these two add to the sum."""
 _EVEN: Final = _U(0x00FF_00FF_00FF_00FF)
 _ADD: Final = _U(0x0001_0001_0001_0001)
-_FOUR: Final = _U(0xFFFF_FFFF)
-_BYTE: Final = _U(0xFF)
 FIVE: Final = _U(0xFF_FFFF_FFFF)
 """The bytes of word 1 that are the frame's."""
 
@@ -66,26 +67,61 @@ _CLASSES: Final = _classes()
 _PAIRS: Final = _masks(1, 12, _REPLY | _REQUEST)
 _STARTS: Final = _masks(1, 10, _A5)
 _LATE: Final = _masks(10, 13, _A5)
+_AT_ONCE: Final = 8192
+"""So many rows are looked at before the next: they stay in the processor's cache."""
+_PAIRS_IN_DATA: Final = _U(0x0003_0303_0303_0303)
+"""Where a pair can begin in eight bytes."""
+_A5_IN_DATA: Final = _U(0x0101_0101_0101_0101 * _A5)
 
 
-def gather(buffer: Bytes, offset: Ints) -> Words:
-    """Return the sixteen bytes at each offset."""
-    at_every_word = np.ndarray(((len(buffer) - 16) // 4 + 1,), "V16", buffer.data, 0, (4,))
-    return at_every_word[offset >> 2].view(_U).reshape(len(offset), 2)
+def whole(words: Words) -> tuple[Flags, Ints]:
+    """Tell which rows begin with an A5 frame whose sum is right, and in which of these another window may begin."""
+    good = np.zeros(len(words), np.bool_)
+    some = [_whole(words[begin : begin + _AT_ONCE], begin, good) for begin in range(0, len(words), _AT_ONCE)]
+    return good, np.concatenate(some) if some else np.zeros(0, np.int64)
 
 
-def good(words: Words) -> Flags:
-    """Tell which rows begin with an A5 frame whose sum is right."""
-    first, second = words[:, 0], words[:, 1]
-    head = second & _FOUR
-    eight = _U(8)
-    total = (first & _EVEN) + (first >> eight & _EVEN) + (head & _EVEN) + (head >> eight & _EVEN)
-    total = total * _ADD >> _U(48)
-    return (first & _START == _A5_08) & ((total ^ second >> _U(32)) & _BYTE == 0)
+def _whole(words: Words, begin: int, out: Flags) -> Ints:
+    """Look at some rows, of which `begin` is the first: set the flags of those with a frame; return the doubtful."""
+    raw = words.view(np.uint8).reshape(-1, 16)
+    address, data_id, sent = raw[:, 1].copy(), raw[:, 2].copy(), raw[:, 12].copy()
+    data = np.ndarray((len(words),), _U, words, 4, (16,)).copy()
+    some = _maybe_ambiguous(address, data_id, data, sent)
+    # The sum of the eight data bytes: as four numbers of 16 bits, then as one.
+    total = data & _EVEN
+    data >>= _U(8)
+    data &= _EVEN
+    total += data
+    total *= _ADD
+    total >>= _U(48)
+    low = total.astype(np.uint8)
+    low += address
+    low += data_id
+    low += _FIXED
+    good = low == sent
+    good &= (words.view(np.uint32)[:, 0] & _START) == _A5_08
+    out[begin : begin + len(words)] = good
+    some = some[good[some]]
+    return begin + some[_ambiguous(words[some])]
 
 
-def ambiguous(words: Words) -> Flags:
-    """Tell in which rows, each a frame, another window begins or could begin (dalyref.heads.WHOLE)."""
+def _maybe_ambiguous(address: Bytes, data_id: Bytes, data: Words64, sent: Bytes) -> Ints:
+    """Return some rows that `_ambiguous` is to look at; in the others nothing else can begin."""
+    # Byte 3 is 08: it is no address and no function.
+    here, behind, last = (
+        np.frombuffer(each.tobytes().translate(_CLASSES), np.uint8) for each in (address, data_id, sent)
+    )
+    found = (here & behind >> _U8(4)) | ((here | behind | last) & _U8(_A5))
+    each = np.frombuffer(data.tobytes().translate(_CLASSES), _U)
+    found |= (each >> _U(56)).astype(np.uint8) & last >> _U8(4)
+    pairs = each >> _U(12)
+    pairs &= each
+    pairs &= _PAIRS_IN_DATA
+    pairs |= each & _A5_IN_DATA
+    return np.flatnonzero((pairs != 0) | (found != 0))
+
+
+def _ambiguous(words: Words) -> Flags:
     raw = np.frombuffer(words.tobytes().translate(_CLASSES) + bytes(8), np.uint8)
     size = words.size * 8
     here = raw[:size]

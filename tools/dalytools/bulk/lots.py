@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
@@ -13,9 +14,10 @@ from dalyref import cells, texts, writes
 from dalyref.addresses import REPLY, REQUEST
 from dalyref.kinds import Dialect
 from dalytools.bulk import payloads, runs, tables
-from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction, risen, rows_of
+from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction, part_of, risen, rows_of
 from dalytools.bulk.columns import Column, Table
 from dalytools.bulk.directions import Directions
+from dalytools.bulk.equal import all_equal
 from dalytools.bulk.modbus import Modbus
 from dalytools.bulk.newest import Newest
 from dalytools.bulk.records import DIALECTS, FRAME
@@ -23,15 +25,18 @@ from dalytools.bulk.runs import Running
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from dalyref.options import Options
     from dalyref.values import Fields
-    from dalytools.bulk.arrays import Bytes, Ints
+    from dalytools.bulk.arrays import Bytes, Ints, Shorts
     from dalytools.bulk.packets import Interfaces
     from dalytools.bulk.records import Records
 
 _BUS_NAME: Final = re.compile(r"bus=([^\s,;]+)")
 _A5: Final = DIALECTS.index(Dialect.A5)
 _MOST_REMEMBERED: Final = 65536
+_IS_WRITE: Final = np.array([writes.is_write(data_id) for data_id in range(256)], np.bool_)
 _TAIL: Final = 1024
 """So many frames are nearly always more than come in a second."""
 _PACK, _MOS, _STATUS = 0x90, 0x93, 0x94
@@ -70,9 +75,9 @@ class _Lot:
     found: tables.Found
     now_ns: Ints
     """The latest beginning of a record of any bus, by record."""
-    count: Ints
+    count: Shorts
     """By record: of 95 and 96 the number of cells or sensors (0: not known), of 90 the state beside it (-1: none)."""
-    base: Ints
+    base: Shorts
     """By record: what the numbers of its burst are counted from; -1: it is no part of any."""
 
 
@@ -139,7 +144,7 @@ class Decoder:
         now_ns = risen(records.time_ns, self._now_ns)
         self._now_ns = int(now_ns[-1])
         self._pace.check(now_ns)
-        lot = _Lot(batch, found, now_ns, np.zeros(count, np.int64), np.full(count, -1, np.int64))
+        lot = _Lot(batch, found, now_ns, np.zeros(count, np.int16), np.full(count, -1, np.int16))
         for bus, rows in self._by_bus(records):
             self._of_bus(bus, rows, lot)
         self._rows += count
@@ -155,6 +160,8 @@ class Decoder:
             if bus is None:
                 bus = self._buses[key] = _Bus(Directions(self._options), Modbus(self._options))
             known.append(bus)
+        if all_equal(records.interface):
+            return [(known[int(records.interface[0])], np.arange(len(records)))]
         used = np.flatnonzero(np.bincount(records.interface)).tolist()
         buses = {id(known[interface]): known[interface] for interface in used}
         if len(buses) == 1:
@@ -168,28 +175,34 @@ class Decoder:
 
     def _of_bus(self, bus: _Bus, rows: Ints, lot: _Lot) -> None:
         batch, records, now_ns = lot.batch, lot.batch.records, lot.now_ns
-        everything = len(rows) == len(records)
-        here: slice | Ints = slice(None) if everything else rows
-        bus_now_ns = risen(records.time_ns[here], bus.now_ns)
-        bus.now_ns = int(bus_now_ns[-1])
-        good = records.kind[here] == FRAME
-        if not good.all():
-            rows, bus_now_ns = rows[good], bus_now_ns[good]
+        time_ns, kind, dialect = records.time_ns, records.kind, records.dialect
+        here: Ints | slice = slice(None)
+        if len(rows) != len(records):
             here = rows
-        latest_ns = risen(records.time_ns[here], bus.latest_ns)
-        serial = records.dialect[here] == _A5
-        if not serial.all():
-            for at in np.flatnonzero(~serial).tolist():
+            time_ns, kind, dialect, now_ns = time_ns[here], kind[here], dialect[here], now_ns[here]
+        bus_now_ns = now_ns if now_ns is time_ns and bus.now_ns <= time_ns[0] else risen(time_ns, bus.now_ns)
+        bus.now_ns = int(bus_now_ns[-1])
+        if not (kind == FRAME).all():
+            good = np.flatnonzero(kind == FRAME)
+            here = rows = rows[good]
+            time_ns, dialect, now_ns, bus_now_ns = time_ns[good], dialect[good], now_ns[good], bus_now_ns[good]
+        if not len(rows):
+            return
+        rising = bus_now_ns is time_ns and bus.latest_ns <= time_ns[0]
+        latest_ns = time_ns if rising else risen(time_ns, bus.latest_ns)
+        if not (dialect == _A5).all():
+            for at in np.flatnonzero(dialect != _A5).tolist():
                 row = int(rows[at])
                 batch.modbus[row] = bus.modbus.take(records, row, int(latest_ns[at]))
             bus.latest_ns = int(latest_ns[-1])
-            rows, bus_now_ns, latest_ns = rows[serial], bus_now_ns[serial], latest_ns[serial]
-            here = rows
-        words = records.words[here]
+            serial = np.flatnonzero(dialect == _A5)
+            here = rows = rows[serial]
+            time_ns, latest_ns, now_ns, bus_now_ns = (each[serial] for each in (time_ns, latest_ns, now_ns, bus_now_ns))
+        words = part_of(records.words, here)
         address = words.view(np.uint8).reshape(-1, 16)[:, 1]
         frames = BusFrames(
             rows,
-            records.time_ns[here],
+            time_ns,
             records.end_ns[here],
             latest_ns,
             records.side[here],
@@ -201,34 +214,29 @@ class Decoder:
             return
         bus.latest_ns = max(bus.latest_ns, int(latest_ns[-1]))
         before = bus.before if bus.before is not None else frames.part(slice(0, 0))
-        known = len(before)
-        both = frames.behind(before)
-        bus.directions.find(both, known, bus.running)
-        frames.direction = both.direction[known:]
+        bus.directions.find(before, frames, bus.running)
         judged = runs.judge(frames, bus.running, self._burst_ns)
-        clock = runs.Clock(bus_now_ns, now_ns[here], self._burst_ns)
+        clock = runs.Clock(bus_now_ns, now_ns, self._burst_ns)
         runs.check(frames, judged, bus.running, clock, self._rows)
-        frames.answers[judged.at[judged.begins]] = True
+        frames.answers[judged.at] = judged.begins
         batch.direction[here] = frames.direction
         self._find(bus, frames, judged, lot)
         self._remember(bus, frames, before)
 
     def _find(self, bus: _Bus, frames: BusFrames, judged: runs.Runs, lot: _Lot) -> None:
         """Find how many cells and sensors each burst has, and its tables."""
-        reply = frames.direction == REPLY
-        data_id, address = frames.byte(2), frames.byte(1)
-        status = np.flatnonzero(reply & (data_id == _STATUS))
-        number_of_cells, number_of_sensors = frames.byte(4)[status], frames.byte(5)[status]
-        count = np.zeros(len(judged.at), np.int64)
-        ids = data_id[judged.at]
+        raw = rows_of(frames.words, judged.at)
+        ids, address = judged.data_id, judged.address
+        status = np.flatnonzero(ids == _STATUS)
+        number_of_cells, number_of_sensors = raw[status, 4], raw[status, 5]
+        count = np.zeros(len(judged.at), np.int16)
         for kind, newest, told, most in (
             (cells.CELLS, bus.cells, number_of_cells, cells.MOST_CELLS),
             (cells.TEMPERATURES, bus.sensors, number_of_sensors, cells.MOST_SENSORS),
         ):
             valid = (told >= 1) & (told <= most)
             mine = np.flatnonzero(ids == kind)
-            at = judged.at[mine]
-            known = newest.look(at, address[at], status[valid], address[status[valid]], told[valid])
+            known = newest.look(mine, address[mine], status[valid], address[status[valid]], told[valid])
             count[mine] = np.maximum(known, 0)
         row = frames.row[judged.at]
         lot.count[row] = count
@@ -237,10 +245,9 @@ class Decoder:
             count[judged.first < 0] = bus.running.count
         bursts = tables.Bursts(frames, judged, count, lot.batch.records, self._rows, lot.found)
         bus.running = bursts.find(bus.running)
-        packs = np.flatnonzero(reply & (data_id == _PACK))
-        mos = np.flatnonzero(reply & (data_id == _MOS))
-        state = bus.state.look(packs, address[packs], mos, address[mos], frames.byte(4)[mos])
-        lot.count[frames.row[packs]] = state
+        packs = np.flatnonzero(ids == _PACK)
+        mos = np.flatnonzero(ids == _MOS)
+        lot.count[row[packs]] = bus.state.look(packs, address[packs], mos, address[mos], raw[mos, 4])
 
     def _remember(self, bus: _Bus, frames: BusFrames, before: BusFrames) -> None:
         """Keep what a request still to come may belong to."""
@@ -283,14 +290,12 @@ def _add_tables(lot: _Lot) -> None:
     """Add a table for each data ID."""
     batch, count_of, base_of = lot.batch, lot.count, lot.base
     records, direction = batch.records, batch.direction
-    raw = records.words.view(np.uint8).reshape(-1, 16)
-    replies = np.flatnonzero(direction == REPLY)
-    ids = raw[replies, 2]
-    for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
-        rows = replies[ids == data_id]
-        data = rows_of(records.words, rows)[:, 4:12]
+    sent = records.words.view(np.uint8).reshape(-1, 16)[:, 2]
+    for data_id, rows in _by_id(np.flatnonzero(direction == REPLY), sent):
+        raw = rows_of(records.words, rows)
+        data = raw[:, 4:12]
         if data_id in cells.SLOTS:
-            columns = _parts(data_id, data, count_of[rows], base_of[rows])
+            columns = _parts(data_id, raw, count_of[rows], base_of[rows])
         elif data_id in texts.FIELDS:
             columns = {"daly.frame_number": Column(data[:, 0])}
         else:
@@ -299,42 +304,53 @@ def _add_tables(lot: _Lot) -> None:
                 state = count_of[rows]
                 columns["daly.pack.state"] = Column(np.maximum(state, 0).astype(np.uint8), state >= 0)
         if columns:
-            batch.replies[data_id] = _table(batch, rows, columns)
+            batch.replies[data_id] = _table(batch, rows, raw, columns)
     requests = np.flatnonzero(direction == REQUEST)
-    ids = raw[requests, 2]
-    for data_id in np.flatnonzero(np.bincount(ids, minlength=256)).tolist():
-        if writes.is_write(data_id):
-            rows = requests[ids == data_id]
-            columns = payloads.of_writes(data_id, rows_of(records.words, rows)[:, 4:12])
-            if columns:
-                batch.writes[data_id] = _table(batch, rows, columns)
+    for data_id, rows in _by_id(requests[_IS_WRITE.take(sent[requests])], sent):
+        raw = rows_of(records.words, rows)
+        columns = payloads.of_writes(data_id, raw[:, 4:12])
+        if columns:
+            batch.writes[data_id] = _table(batch, rows, raw, columns)
 
 
-def _parts(data_id: int, data: Bytes, count: Ints, base: Ints) -> dict[str, Column]:
+def _by_id(rows: Ints, sent: Bytes) -> Iterator[tuple[int, Ints]]:
+    """Sort rising rows by data ID. sent: of each record."""
+    ids = sent[rows]
+    order = np.argsort(ids, kind="stable")
+    rows, ids = rows[order], ids[order]
+    bounds = [0, *(np.flatnonzero(ids[1:] != ids[:-1]) + 1).tolist(), len(rows)]
+    for begin, end in itertools.pairwise(bounds):
+        if end > begin:
+            yield int(ids[begin]), rows[begin:end]
+
+
+def _parts(data_id: int, raw: Bytes, count: Shorts, base: Shorts) -> dict[str, Column]:
     """Return the columns of single frames of 95 or 96. base: -1 where a frame is no part of any burst."""
     slots = cells.SLOTS[data_id]
-    number = data[:, 0].astype(np.int64)
-    real = np.where(count > 0, np.clip(count - slots * (number - base), 0, slots), slots)
-    real = np.where(base < 0, 0, real)
+    number = raw[:, 4]
+    real = count - slots * (number.astype(np.int16) - base)
+    np.clip(real, 0, slots, out=real)
+    real[count <= 0] = slots
+    real[base < 0] = 0
     if data_id == cells.CELLS:
-        values = data[:, 1:7:2].astype(np.int64) << 8 | data[:, 2:7:2]
+        values = tables.cell_slots(raw)
         name = "daly.cell.voltage"
     else:
-        values = data[:, 1:8].astype(np.int64) - 40
+        values = raw[:, 5:12].astype(np.int64) - 40
         name = "daly.temperature"
-    return {"daly.frame_number": Column(data[:, 0]), name: Column(values, length=real)}
+    return {"daly.frame_number": Column(number), name: Column(values, length=real.astype(np.int64))}
 
 
-def _table(batch: Batch, rows: Ints, columns: dict[str, Column]) -> Table:
+def _table(batch: Batch, rows: Ints, raw: Bytes, columns: dict[str, Column]) -> Table:
     records = batch.records
-    address = records.words.view(np.uint8).reshape(-1, 16)[rows, 1]
+    address = raw[:, 1]
     return Table(
         batch.first_row + rows,
         records.number[rows],
         records.time_ns[rows],
         records.interface[rows],
         address,
-        BOARD[address],
+        BOARD.take(address),
         columns,
     )
 

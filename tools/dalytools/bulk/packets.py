@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dalyref.packet import Direction
-    from dalytools.bulk.arrays import Bytes, Ints
+    from dalytools.bulk.arrays import Bytes, Ints, Words
 
 SIDES: Final[tuple[Direction, ...]] = ("", "inbound", "outbound")
 """What a side's number means."""
@@ -35,7 +35,7 @@ class Packets:
     """Some packets in the order of the file, a row each."""
 
     buffer: Bytes
-    """Holds their data, and SPARE bytes behind."""
+    """Holds their data, and SPARE bytes behind. What reads the file writes over it for the next packets."""
     number: Ints
     time_ns: Ints
     interface: Ints
@@ -45,6 +45,8 @@ class Packets:
     offset: Ints
     """Of the first byte of data in `buffer`: a multiple of four."""
     length: Ints
+    words: Words
+    """The first sixteen bytes of each, whatever it has less than that."""
     comments: dict[int, str]
     """By packet number, of the few that have one."""
 
@@ -104,13 +106,27 @@ def from_objects(packets: Sequence[Packet], interfaces: Interfaces) -> Packets:
         if packet.comment:
             comments[packet.number] = packet.comment
     data += bytes(SPARE)
+    buffer = np.frombuffer(bytes(data), np.uint8)
+    offset = np.array(rows.offset, np.int64)
     return Packets(
-        np.frombuffer(bytes(data), np.uint8),
+        buffer,
         np.array(rows.number, np.int64),
         np.array(rows.time_ns, np.int64),
         np.array(rows.interface, np.int64),
         np.array(rows.side, np.uint8),
-        np.array(rows.offset, np.int64),
+        offset,
         np.array(rows.length, np.int64),
+        gather(buffer, offset),
         comments,
     )
+
+
+def gather(buffer: Bytes, offset: Ints) -> Words:
+    """Return the sixteen bytes at each offset, a multiple of four."""
+    if len(offset) > 1:
+        first, step = int(offset[0]), int(offset[1] - offset[0])
+        if step > 0 and (offset[1:] - offset[:-1] == step).all():
+            evenly = np.ndarray((len(offset),), "V16", buffer.data, first, (step,))
+            return evenly.copy().view(np.uint64).reshape(-1, 2)
+    at_every_word = np.ndarray(((len(buffer) - 16) // 4 + 1,), "V16", buffer.data, 0, (4,))
+    return at_every_word[offset >> 2].view(np.uint64).reshape(len(offset), 2)

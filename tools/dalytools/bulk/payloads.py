@@ -91,14 +91,19 @@ def _balance(data: Bytes) -> Columns:
 
 
 def _faults(data: Bytes) -> Columns:
-    bits = np.ascontiguousarray(np.unpackbits(data, axis=1, bitorder="little").T).view(np.bool_)
-    columns = {faults.PREFIX + name: Column(bits[at]) for at, name in _FAULTS}
+    some = bool(data[:, :7].any())
+    bits: Flags = np.zeros((8 * data.shape[1], len(data)), np.bool_)
+    if some:
+        bits[:] = np.unpackbits(data, axis=1, bitorder="little").T
+    columns = {name: Column(bits[at]) for at, name in _FAULTS}
     columns["daly.fault_code"] = Column(data[:, 7])
-    columns["daly.fault_count"] = Column(bits[_COUNTED].sum(0))
+    columns["daly.fault_count"] = Column(bits[_COUNTED].sum(0) if some else np.zeros(len(data), np.int64))
     return columns
 
 
-_FAULTS: Final = [(8 * byte + bit, name) for byte, row in enumerate(faults.TABLE) for bit, name in enumerate(row)]
+_FAULTS: Final = [
+    (8 * byte + bit, faults.PREFIX + name) for byte, row in enumerate(faults.TABLE) for bit, name in enumerate(row)
+]
 _COUNTED: Final = [at for at, _ in _FAULTS if at not in {52, 53}]
 """Without bits 4 and 5 of byte 6, which are not among the paper's faults."""
 _AT_ONCE: Final[dict[int, Callable[[Bytes], Columns]]] = {
@@ -127,7 +132,10 @@ def of_writes(data_id: int, data: Bytes) -> Columns:
 
 def _each_once(data: Bytes, decode: Callable[[bytes], Fields]) -> Columns:
     wide = np.ascontiguousarray(data).view(np.uint64)[:, 0]
-    different, which = np.unique(wide, return_inverse=True)
+    if (wide == wide[0]).all():
+        different, which = wide[:1], np.zeros(len(wide), np.int64)
+    else:
+        different, which = np.unique(wide, return_inverse=True)
     found = [decode(one.tobytes()) for one in different]
     names = dict.fromkeys(name for fields in found for name in fields if name not in LEFT_OUT)
     return {name: _expanded([fields.get(name) for fields in found], which) for name in names}

@@ -22,7 +22,8 @@ from dalyref.file_order import FileOrder
 from dalyref.kinds import Dialect, Kind
 from dalyref.packet import SERIAL_LINK_TYPES
 from dalyref.streams import Located
-from dalytools.bulk.frames import Stands, ambiguous, gather, good, stands
+from dalytools.bulk.equal import all_equal
+from dalytools.bulk.frames import Stands, stands, whole
 from dalytools.bulk.packets import SIDES
 from dalytools.bulk.unlike import NotSerialError, UnlikeError
 
@@ -89,10 +90,11 @@ class Cutter:
     def take(self, packets: Packets) -> Records:
         """Take the next packets; return the records that are certain."""
         self._refuse_others(packets)
-        words = gather(packets.buffer, packets.offset)
+        words = packets.words
         streams = _Streams(packets)
         at_once = self._clean(packets, words, streams)
-        at_once |= packets.length == 0
+        if not packets.length.all():
+            at_once |= packets.length == 0
         held = self._cut(packets, at_once, streams)
         records = self._frames(packets, words, at_once)
         self._note_passed(packets, at_once, streams)
@@ -114,21 +116,20 @@ class Cutter:
 
     def _clean(self, packets: Packets, words: Words, streams: _Streams) -> Flags:
         """Tell which packets are a record by themselves, when nothing is held before."""
-        frame = packets.length == a5.SIZE
-        frame &= good(words)
-        doubtful = np.flatnonzero(frame & ambiguous(words))
+        frame, doubtful = whole(words)
+        frame &= packets.length == a5.SIZE
+        doubtful = doubtful[frame[doubtful]]
         if not len(doubtful):
             return frame
         out = frame.copy()
-        for row in doubtful.tolist():
-            verdict = stands(words[row].tobytes()[: a5.SIZE])
-            if verdict is Stands.BEFORE_FRAME:
-                behind = streams.after(row)
-                out[row] = behind >= 0 and (
-                    frame[behind] or packets.time_ns[behind] - packets.time_ns[row] > self._lasts_ns + self._quiet_ns
-                )
-            elif verdict is Stands.NO:
-                out[row] = False
+        raw = words[doubtful].tobytes()
+        verdicts = [stands(raw[at : at + a5.SIZE]) for at in range(0, len(raw), 16)]
+        out[doubtful] = [verdict is Stands.ALONE for verdict in verdicts]
+        before_frame = doubtful[[verdict is Stands.BEFORE_FRAME for verdict in verdicts]]
+        if len(before_frame):
+            behind = streams.after(before_frame)
+            silence_ns = packets.time_ns[behind] - packets.time_ns[before_frame]
+            out[before_frame] = (behind >= 0) & (frame[behind] | (silence_ns > self._lasts_ns + self._quiet_ns))
         return out
 
     def _cut(self, packets: Packets, at_once: Flags, streams: _Streams) -> list[Located]:
@@ -169,16 +170,17 @@ class Cutter:
 
     def _frames(self, packets: Packets, words: Words, at_once: Flags) -> Records:
         """Make the records of packets that are one each."""
-        event = packets.length == 0
         kind = np.full(len(packets), FRAME, np.uint8)
         dialect = np.full(len(packets), _A5, np.uint8)
         end_ns = packets.time_ns + self._lasts_ns
-        if event.any():
+        others: dict[int, bytes] = {}
+        if not packets.length.all():
+            event = packets.length == 0
             kind[event] = EVENT
             dialect[event] = 0
             end_ns[event] -= self._lasts_ns
-        others = dict.fromkeys(np.flatnonzero((kind == EVENT)[at_once]).tolist(), b"")
-        some: slice | Flags = slice(None) if at_once.all() else at_once
+            others = dict.fromkeys(np.flatnonzero(event[at_once]).tolist(), b"")
+        some: slice | Ints = slice(None) if at_once.all() else np.flatnonzero(at_once)
         return Records(
             packets.number[some],
             packets.time_ns[some],
@@ -226,9 +228,7 @@ class _Streams:
         self._packets = packets
         self._rows: dict[tuple[int, int], Sequence[int]] = {}
         interface, side = packets.interface, packets.side
-        self._one = bool(
-            len(packets) and packets.length.all() and (interface == interface[0]).all() and (side == side[0]).all()
-        )
+        self._one = bool(len(packets) and packets.length.all() and all_equal(interface) and all_equal(side))
 
     def present(self) -> list[tuple[int, int]]:
         """Return all streams: (interface, side)."""
@@ -244,11 +244,17 @@ class _Streams:
         at = bisect_left(rows, row)
         return rows[at - 1] if at else -1
 
-    def after(self, row: int) -> int:
-        """Return the next row of the stream that `row` is of, -1: none."""
-        rows = self._of((int(self._packets.interface[row]), int(self._packets.side[row])))
-        at = bisect_right(rows, row)
-        return rows[at] if at < len(rows) else -1
+    def after(self, rows: Ints) -> Ints:
+        """Return of each row the next of its stream, -1: none."""
+        if self._one:
+            return np.where(rows + 1 < len(self._packets), rows + 1, -1)
+        interface, side = self._packets.interface, self._packets.side
+        found: list[int] = []
+        for row in rows.tolist():
+            same = self._of((int(interface[row]), int(side[row])))
+            at = bisect_right(same, row)
+            found.append(same[at] if at < len(same) else -1)
+        return np.array(found, np.int64)
 
     def _of(self, key: tuple[int, int]) -> Sequence[int]:
         if self._one:

@@ -18,11 +18,11 @@ from dalyref import bursts, cells
 from dalyref.addresses import REPLY, REQUEST
 from dalyref.file_order import LATE_NS
 from dalyref.options import NANO
-from dalytools.bulk.bus_frames import IS_BURST
+from dalytools.bulk.bus_frames import IS_BURST, rows_of
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
-    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints
+    from dalytools.bulk.arrays import Bytes, Flags, Ints, Shorts
     from dalytools.bulk.bus_frames import BusFrames
 
 _MOST_ROUNDS: Final = 8
@@ -66,12 +66,16 @@ class Runs:
 
     at: Ints
     """Where it stands in the lot."""
+    data_id: Bytes
+    address: Bytes
     begins: Flags
-    number: Ints
+    begin: Ints
+    """The indices, among these rows, of those that begin."""
+    number: Shorts
     """As sent, of frames of a burst; else -1."""
     first: Ints
     """Index, among these rows, of the first of its burst; -1: it goes on with the one that was running before."""
-    base: Ints
+    base: Shorts
     """What the numbers of its burst are counted from: 0 or 1."""
 
 
@@ -81,14 +85,18 @@ def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
     Raises UnlikeError where that depends on more than neighbours.
     """
     at = np.flatnonzero(frames.direction == REPLY)
-    kept = _Kept(at, frames.byte(2)[at], frames.byte(1)[at], frames.byte(4)[at])
-    burst = IS_BURST[kept.data_id]
-    number = kept.number
-    keep = ~burst | (number != bursts.INVALID)
-    is_cells, is_sensors = kept.data_id == cells.CELLS, kept.data_id == cells.TEMPERATURES
-    keep &= ~((is_cells & (number > _CELLS_LAST)) | (is_sensors & (number > _SENSORS_LAST)))
-    doubtful = keep & ((is_cells & (number == _CELLS_LAST)) | (is_sensors & (number == _SENSORS_LAST)))
-    kept.number = np.where(burst, number, -1).astype(np.int64)
+    raw = rows_of(frames.words, at)
+    data_id, address, sent = raw[:, 2].copy(), raw[:, 1].copy(), raw[:, 4].copy()
+    burst = IS_BURST.take(data_id)
+    is_cells, is_sensors = data_id == cells.CELLS, data_id == cells.TEMPERATURES
+    keep = ~burst | (sent != bursts.INVALID)
+    keep &= ~((is_cells & (sent > _CELLS_LAST)) | (is_sensors & (sent > _SENSORS_LAST)))
+    doubtful = keep & ((is_cells & (sent == _CELLS_LAST)) | (is_sensors & (sent == _SENSORS_LAST)))
+    number = sent.astype(np.int16)
+    number += 1
+    number *= burst
+    number -= 1
+    kept = _Kept(at, data_id, address, number)
     some_doubtful = doubtful.any()
     for _ in range(_MOST_ROUNDS):
         runs = _judge_kept(frames, kept if keep.all() else kept.part(keep), running, burst_ns)
@@ -110,7 +118,7 @@ class _Kept:
     at: Ints
     data_id: Bytes
     address: Bytes
-    number: Array
+    number: Shorts
 
     def part(self, which: Flags) -> _Kept:
         return _Kept(self.at[which], self.data_id[which], self.address[which], self.number[which])
@@ -119,18 +127,17 @@ class _Kept:
 def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, burst_ns: int) -> Runs:
     at, data_id, address, number = kept.at, kept.data_id, kept.address, kept.number
     if not len(at):
-        none = np.zeros(0, np.int64)
-        return Runs(at, np.zeros(0, np.bool_), none, none, none)
-    burst = number >= 0
-    end_ns = frames.end_ns[at]
-    goes_on = burst
+        none, short = np.zeros(0, np.int64), np.zeros(0, np.int16)
+        return Runs(at, data_id, address, np.zeros(0, np.bool_), none, short, none, short)
+    start_ns, end_ns = frames.start_ns[at], frames.end_ns[at]
+    goes_on = number >= 0
     goes_on[1:] &= (data_id[1:] == data_id[:-1]) & (address[1:] == address[:-1]) & (number[1:] >= number[:-1])
-    goes_on[1:] &= frames.start_ns[at[1:]] - end_ns[:-1] <= burst_ns
+    goes_on[1:] &= start_ns[1:] - end_ns[:-1] <= burst_ns
     goes_on[0] &= (
         int(data_id[0]) == running.data_id
         and int(address[0]) == running.address
         and int(number[0]) >= running.number
-        and int(frames.start_ns[at[0]]) - running.end_ns <= burst_ns
+        and int(start_ns[0]) - running.end_ns <= burst_ns
     )
     same = np.flatnonzero(goes_on[1:] & (number[1:] == number[:-1])) + 1
     if len(same):
@@ -139,12 +146,19 @@ def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, burst_ns: int)
         before = frames.part(slice(0, int(at[0])))
         asked = (before.direction == REQUEST) & (before.byte(2) == running.data_id)
         goes_on[0] = not (running.asked or asked.any())
-    index = np.arange(len(at))
-    first = np.maximum.accumulate(np.where(goes_on, -1, index))
-    base = np.where(number[np.maximum(first, 0)] == 0, 0, 1)
-    if first[0] < 0:
-        base[first < 0] = running.base
-    return Runs(at, ~goes_on, number, first, base)
+    begins = ~goes_on
+    begin = np.flatnonzero(begins)
+    head = int(begin[0]) if len(begin) else len(at)
+    sizes = np.diff(begin, append=len(at))
+    first = np.repeat(begin, sizes)
+    begins_with_0 = number[begin] == 0
+    base = (
+        np.repeat(1 - begins_with_0.astype(np.int16), sizes) if begins_with_0.any() else np.ones(len(first), np.int16)
+    )
+    if head:
+        first = np.concatenate((np.full(head, -1), first))
+        base = np.concatenate((np.full(head, running.base, np.int16), base))
+    return Runs(at, data_id, address, begins, begin, number, first, base)
 
 
 def _asked_between(frames: BusFrames, after: Ints, before: Ints, data_id: Bytes) -> Flags:
@@ -176,16 +190,18 @@ def check(frames: BusFrames, runs: Runs, running: Running, clock: Clock, first_r
 
     first_row: number of the lot's first record over the whole file.
     """
-    later = np.flatnonzero(~runs.begins)
-    if not len(later):
+    if len(runs.begin) == len(runs.at):
         return
-    at = runs.at[later]
-    first = runs.first[later]
-    begun = np.where(first >= 0, first_row + frames.row[runs.at[np.maximum(first, 0)]], running.first_row)
-    if (first_row + frames.row[at] - begun > _MOST_ROWS).any():
+    row = frames.row[runs.at]
+    last = np.append(runs.begin, len(row)) - 1  # of the bursts that end, and of the lot's last
+    spread = row[last[1:]] - row[runs.begin]
+    spread_before = first_row + int(row[last[0]]) - running.first_row if last[0] >= 0 else 0
+    if spread_before > _MOST_ROWS or (len(spread) and spread.max() > _MOST_ROWS):
         raise UnlikeError("a burst spread over thousands of records")
-    if (clock.now_ns == frames.start_ns).all():
+    if clock.now_ns is frames.start_ns or (clock.now_ns == frames.start_ns).all():
         return  # the times rise
+    later = np.flatnonzero(~runs.begins)
+    at = runs.at[later]
     before = np.where(later > 0, frames.end_ns[runs.at[np.maximum(later - 1, 0)]], running.end_ns)
     over = clock.bus_ns[at] - before > clock.burst_ns + NANO // 2
     over |= clock.now_ns[at] - before > clock.burst_ns + LATE_NS

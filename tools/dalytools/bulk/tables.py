@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -21,13 +21,13 @@ from dalytools.bulk.runs import Running
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints
+    from dalytools.bulk.arrays import Array, Bytes, Flags, Ints, Shorts
     from dalytools.bulk.bus_frames import BusFrames
     from dalytools.bulk.records import Records
     from dalytools.bulk.runs import Runs
 
 _WIDTH: Final = {cells.CELLS: cells.MOST_CELLS, cells.TEMPERATURES: cells.MOST_SENSORS}
-_TEXTS: Final = list(texts.FIELDS)
+_IS_TEXT: Final = np.array([data_id in texts.FIELDS for data_id in range(256)], np.bool_)
 FIELDS: Final = {
     cells.CELLS: ("daly.cells.", "voltage"),
     cells.TEMPERATURES: ("daly.sensors.", "temperature"),
@@ -79,7 +79,7 @@ class Bursts:
 
     frames: BusFrames
     runs: Runs
-    count: Ints
+    count: Shorts
     """Of cells or sensors at the beginning of each reply's burst, 0: not known."""
     records: Records
     first_row: int
@@ -93,8 +93,7 @@ class Bursts:
         at = runs.at
         if not len(at):
             return replace(running, asked=running.asked + _asked(frames, running.data_id))
-        data_id = frames.byte(2)[at]
-        begins = np.flatnonzero(runs.begins)
+        begins = runs.begin
         current = running
         # The burst that was running goes on; when another reply begins something, it has ended.
         first_begin = int(begins[0]) if len(begins) else len(at)
@@ -105,14 +104,17 @@ class Bursts:
             repeated = _repeated(runs)
             for kind in _WIDTH:
                 self._at_once(kind, repeated)
-            bounds = np.append(begins, len(at)).tolist()
-            odd = np.isin(data_id[begins], _TEXTS) | (np.isin(data_id[begins], list(_WIDTH)) & repeated[begins])
+            data_id = runs.data_id[begins]
+            odd = _IS_TEXT.take(data_id)
+            if repeated.any():
+                odd |= ((data_id == cells.CELLS) | (data_id == cells.TEMPERATURES)) & repeated[begins]
             for index in np.flatnonzero(odd).tolist():
-                members = range(bounds[index], bounds[index + 1])
+                more = index + 1 < len(begins)
+                members = range(int(begins[index]), int(begins[index + 1]) if more else len(at))
                 last = self._one_by_one(members, self._begun(members[0]), found)
-                if index + 1 < len(begins):
+                if more:
                     ended(last, found)
-            members = range(bounds[-2], len(at))
+            members = range(int(begins[-1]), len(at))
             # What can be told of it already was told above.
             current = self._one_by_one(members, self._begun(members[0]), Found())
         current.asked = _asked(frames.part(slice(int(at[-1]) + 1, None)), current.data_id)
@@ -160,39 +162,46 @@ class Bursts:
         frames, runs, count, records = self.frames, self.runs, self.count, self.records
         at, number = runs.at, runs.number
         per_frame = cells.SLOTS[data_id]
-        mine = (frames.byte(2)[at] == data_id) & (runs.first >= 0)
-        index = np.flatnonzero(mine)
-        if not len(index):
+        bursts = np.flatnonzero(runs.data_id[runs.begin] == data_id)
+        if not len(bursts):
             return
-        first = runs.first[index]
-        step = number[index] - runs.base[index]
-        # Frame number n is the n-th of its burst, so none before it is missing or came twice.
-        in_order = index - first == step
-        begin = per_frame * step + 1
-        known = count[first]
-        complete = (known > 0) & (begin <= known) & (known < begin + per_frame)
+        first = runs.begin[bursts]
+        behind = np.append(runs.begin, len(at))[bursts + 1]
         # Without a count the last of the burst carries the table; whether the lot's last has ended is not known yet.
-        last = np.ones(len(at), np.bool_)
-        last[:-1] = runs.begins[1:]
-        last[-1] = False
-        complete |= (known == 0) & last[index]
-        which = np.flatnonzero(in_order & complete & ~repeated[first])
-        if not len(which):
+        known = count[first]
+        step = np.where(known > 0, (known - 1) // per_frame, behind - first - 1)
+        complete = (first + step < behind) & ((known > 0) | (behind < len(at))) & ~repeated[first]
+        first, known, step = first[complete], known[complete], step[complete]
+        # Frame number n is the n-th of its burst, so none before it is missing or came twice.
+        in_order = number[first + step] - runs.base[first + step] == step
+        first, known, step = first[in_order], known[in_order], step[in_order]
+        if not len(first):
             return
-        length = np.where(known[which] > 0, known[which], per_frame * (step[which] + 1))
-        frames_each = int(step[which].max()) + 1
+        last = first + step
+        length = np.where(known > 0, known, per_frame * (step + 1))
+        frames_each = int(step.max()) + 1
         width = frames_each * per_frame
-        places = np.minimum(first[which][:, None] + np.arange(frames_each), index[which][:, None])
+        places = np.minimum(first[:, None] + np.arange(frames_each), last[:, None])
         raw = rows_of(frames.words, at[places])
         if data_id == cells.CELLS:
-            slots = (raw[:, :, 5:11:2].astype(np.int64) << 8 | raw[:, :, 6:11:2]).reshape(len(which), width)
+            slots = cell_slots(raw).reshape(len(first), width)
         else:
-            slots = raw[:, :, 5:12].reshape(len(which), width).astype(np.int64)
-        slots[np.arange(width) >= length[:, None]] = 0
-        row = frames.row[at[index[which]]]
+            slots = raw[:, :, 5:12].reshape(len(first), width).astype(np.int64)
+        if not (length == width).all():
+            slots[np.arange(width) >= length[:, None]] = 0
+        row = frames.row[at[last]]
         told = (self.first_row + row, records.number[row], records.time_ns[row], records.interface[row])
-        address = frames.byte(1)[at[index[which]]].astype(np.int64)
+        address = runs.address[last].astype(np.int64)
         self.found.rows[data_id].add(told, address, length, slots)
+
+
+def cell_slots(raw: Bytes) -> Ints:
+    """Return the three cells in frames of 95, mV. raw: .. x 16 bytes, from the frame's first."""
+    data = np.ndarray(raw.shape[:-1], np.dtype(">u8"), raw, 4, raw.strides[:-1]).astype(np.int64)
+    slots = np.empty((*data.shape, cells.SLOTS[cells.CELLS]), np.int64)
+    for slot, shift in enumerate((40, 24, 8)):
+        np.bitwise_and(data >> shift, 0xFFFF, out=slots[..., slot])
+    return slots
 
 
 def _asked(frames: BusFrames, data_id: int) -> int:
@@ -239,25 +248,19 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
     parts = (rows.row, rows.number, rows.time_ns, rows.interface, rows.address, rows.length)
     row, number, time_ns, interface, address, length = (np.concatenate(column) for column in parts)
     width = max(part.shape[1] for part in rows.slots)
-    slots = np.concatenate([np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in rows.slots])
-    order = np.argsort(row)
-    row, number, time_ns, interface, address, length, slots = (
-        column[order] for column in (row, number, time_ns, interface, address, length, slots)
+    slots = np.concatenate(
+        [part if part.shape[1] == width else np.pad(part, ((0, 0), (0, width - part.shape[1]))) for part in rows.slots]
     )
+    if not (row[1:] > row[:-1]).all():
+        order = np.argsort(row)
+        row, number, time_ns, interface, address, length, slots = (
+            column[order] for column in (row, number, time_ns, interface, address, length, slots)
+        )
     prefix, name = FIELDS[data_id]
-    there: Flags = np.arange(width, dtype=np.int64)[None, :] < np.asarray(length, np.int64)[:, None]
-    shown = slots
-    if data_id == cells.TEMPERATURES:
-        shown = slots - 40
-        there = there & (slots != 0x00) & (slots != 0xFF)  # no sensor (dalyref.cells.is_there)
-    some: Flags = np.any(there, axis=1)
-    low_first = np.where(there, slots, 1 << 20).argmin(1)
-    high_first = np.where(there, slots, -1).argmax(1)
-    each = np.arange(len(slots))
-    low, high = slots[each, low_first], slots[each, high_first]
-    how_many = np.maximum(np.count_nonzero(there, axis=1), 1)
-    average = np.where(there, slots, 0).sum(1) / how_many
     zero = 40 if data_id == cells.TEMPERATURES else 0
+    shown = slots - zero if zero else slots
+    figures = _figures(data_id, slots, length)
+    some = figures.how_many > 0
     valid = None if some.all() else some
     byte_address = address.astype(np.uint8)
     return Table(
@@ -270,11 +273,44 @@ def table(data_id: int, rows: Rows, board: Bytes) -> Table | None:
         {
             prefix + name: Column(shown, length=length),
             prefix + "count": Column(length),
-            prefix + "min": Column(low - zero, valid),
-            prefix + "min_number": Column(low_first + 1, valid),
-            prefix + "max": Column(high - zero, valid),
-            prefix + "max_number": Column(high_first + 1, valid),
-            prefix + "average": Column(average - zero, valid),
-            prefix + "spread": Column(high - low, valid),
+            prefix + "min": Column(figures.low - zero, valid),
+            prefix + "min_number": Column(figures.low_number, valid),
+            prefix + "max": Column(figures.high - zero, valid),
+            prefix + "max_number": Column(figures.high_number, valid),
+            prefix + "average": Column(figures.total / np.maximum(figures.how_many, 1) - zero, valid),
+            prefix + "spread": Column(figures.high - figures.low, valid),
         },
     )
+
+
+class _Figures(NamedTuple):
+    """What is said of tables, a row each; of one without a value only `how_many` has a meaning."""
+
+    how_many: Ints
+    low: Ints
+    low_number: Ints
+    high: Ints
+    high_number: Ints
+    total: Ints
+
+
+def _figures(data_id: int, slots: Ints, length: Ints) -> _Figures:
+    """Calculate over the slots of each table that hold a cell or sensor: a slot of all tables at a time."""
+    across = np.ascontiguousarray(slots.T, np.int32)
+    place = np.arange(len(across), dtype=np.int32)[:, None]
+    # A value and its place in one number: the least and the largest of them say both, and the first of equal ones.
+    least = across << 8
+    largest = least | (0xFF - place)
+    least |= place
+    count = length
+    if data_id == cells.TEMPERATURES or not (length == len(across)).all():
+        there: Flags = place < length
+        if data_id == cells.TEMPERATURES:
+            there &= (across != 0x00) & (across != 0xFF)  # no sensor (dalyref.cells.is_there)
+        across *= there
+        least |= np.int32(1 << 30) * ~there
+        largest *= there
+        count = there.sum(0)
+    total = across.sum(0)
+    low, high = least.min(0).astype(np.int64), largest.max(0).astype(np.int64)
+    return _Figures(count, low >> 8, (low & 0xFF) + 1, high >> 8, 0x100 - (high & 0xFF), total)
