@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalycapture.captured import CapturedPacket
-from dalyref import can_foreign
+from dalyref import bluetooth_module, can_foreign
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Severity, Tally
 from dalytools.findings.place import Place
@@ -106,7 +106,8 @@ class Wire(Watch):
         line.last = None
         if record.kind is Kind.FOREIGN:
             detail = str(record.fields.get("daly.foreign", ""))
-            self._foreign[Place(bus, detail=detail)].add(record.number, record.time_ns)
+            if detail != bluetooth_module.NAME:  # of the board itself: nothing strange, and no other device
+                self._foreign[Place(bus, detail=detail)].add(record.number, record.time_ns)
         elif record.kind in _DAMAGED:
             if line.begun or record.kind is Kind.BAD_CHECKSUM or record.data[0] == _A5:
                 line.last = record
