@@ -6,6 +6,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
+from dalytools.named_values import named
+
 if TYPE_CHECKING:
     from dalyref.values import Fields, Value
 
@@ -50,17 +52,6 @@ _OWN: Final = frozenset(
     )
 )
 """Fields that a line tells otherwise, or leaves out."""
-_UNITS: Final = {
-    "daly.pack.voltage": "V",
-    "daly.pack.current": "A",
-    "daly.soc": "%",
-    "daly.setting.soc": "%",
-    "daly.cell.voltage": "mV",
-    "daly.temperature": "C",
-    "daly.remaining_capacity": "mAh",
-    "daly.setting.rated_capacity": "mAh",
-    "daly.power": "W",
-}
 
 
 def said(fields: Fields, *, waiting: bool = False) -> tuple[str, str, str, str]:
@@ -94,9 +85,7 @@ def _values(fields: Fields, *, reply: bool) -> str:
             if value is True:
                 shown.append(name.removeprefix("daly.fault."))
             continue
-        words = " ".join(map(str, _all(value)))
-        unit = f" {_UNITS[name]}" if name in _UNITS else ""
-        shown.append(f"{name.removeprefix('daly.')} {words}{unit}")
+        shown.append(named(name, value, fields))
     raw = [f"{number:04X}" for number in _all(fields.get("daly.modbus.value", [])) if isinstance(number, int)]
     if not shown and raw:
         shown.append(" ".join(raw[:_MOST_RAW]) + (f" ... {len(raw)} registers" if len(raw) > _MOST_RAW else ""))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from dalyref import texts
 from dalyref.kinds import Kind
 from dalytools import modbus_lines
+from dalytools.named_values import named, of_battery
 from dalytools.terminal_text import plain
 
 if TYPE_CHECKING:
@@ -27,11 +28,31 @@ NAMES = {
     0x00: "restart",
     0x21: "set clock, SOC",
     0x50: "rated capacity",
+    0x51: "boards",
+    0x52: "totals",
+    0x53: "battery",
+    0x54: "firmware index",
     0x55: "manufacturer",
     0x56: "battery name",
     0x57: "battery code",
+    0x58: "production date",
+    0x59: "cell limits",
+    0x5A: "pack limits",
+    0x5B: "current limits",
+    0x5C: "temp. limits",
+    0x5D: "SOC limits",
+    0x5E: "differences",
+    0x5F: "balancing",
+    0x60: "short circuit",
+    0x61: "clock",
     0x62: "software version",
     0x63: "hardware version",
+    0x64: "fault log",
+    0x65: "board number",
+    0x66: "heater, fan",
+    0x67: "balancer",
+    0x68: "balance set-up",
+    0x69: "inverter",
     0x6A: "serial number",
     0x90: "pack",
     0x91: "cell extremes",
@@ -54,6 +75,8 @@ _TROUBLE = {
     "daly.burst.repeat": "the same part again",
     "daly.burst.cut_off": "cut off here",
 }
+_UNREAD = frozenset(("temp_high", "temp_low"))
+"""Classes of the alarm grid whose bytes nobody is sure of (docs/protocol.md)."""
 _FILLERS = frozenset((bytes(8), b"\xaa" * 8, b""))
 _MOST_BYTES = 32
 _MOST_COMMENT = 300
@@ -151,7 +174,7 @@ def _a5(record: Decoded, *, waiting: bool) -> tuple[str, str, str, str, str]:
     warnings: list[str] = []
     if fields["daly.direction"] != 2:
         who = f"host {address:02X}" + (f" > board {board}" if board else "")
-        values = "" if content in _FILLERS and "daly.write" not in fields else _hex(content)
+        values = of_battery(fields) or ("" if content in _FILLERS and "daly.write" not in fields else _hex(content))
         if fields["daly.direction"] == 3:
             return "echo", who, what, values, "echo: the battery sleeps, or the adapter hears itself"
         if "daly.retry" in fields:
@@ -172,7 +195,9 @@ def _a5(record: Decoded, *, waiting: bool) -> tuple[str, str, str, str, str]:
         whole = fields.get(texts.FIELDS[data_id])
         values = f"part {content[0]}: {fields['daly.text_part']}" + (f'  = "{whole}"' if whole else "")
     else:
-        values = _hex(content)
+        values = of_battery(fields) or _hex(content)
+        if fields.get("daly.alarm.class") in _UNREAD:
+            values += f"  {_hex(content)}"
     if "daly.response_time" in fields:
         values += f"  ({float(str(fields['daly.response_time'])) * 1000:.0f} ms)"
     if result := fields.get("daly.write_result"):
@@ -223,7 +248,7 @@ def _hkms(record: Decoded) -> tuple[str, str, str, str, str]:
     board = fields.get("daly.board")
     name = f"{number:04X} {_HKMS_NAMES.get(number, '')}".rstrip()
     shown = [
-        f"{name.removeprefix('daly.')} {_words(fields, name)}"
+        named(name, value, fields)
         for name, value in fields.items()
         if not name.startswith((*_HKMS_OWN, "daly.cell.0", "daly.cell.1", "daly.cell.2", "daly.cell.3", "daly.cell.4"))
         and name not in ("daly.reserved", "daly.write")

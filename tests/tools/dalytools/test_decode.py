@@ -142,7 +142,7 @@ def test_lines_of_replies() -> None:
     assert "sum_volt_low_level_2  code 3" in text(a5.build(1, 0x98, b"\x80\0\0\0\0\0\0\x03"))
     assert "none" in text(a5.build(1, 0x98))
     assert "part 1: DL-BMS-" in text(a5.build(1, 0x63, b"\x01DL-BMS-"))
-    assert "01 01 00 00 02 00 6c be" in text(a5.build(1, 0xD9, bytes.fromhex("0101000002006cbe")))
+    assert "setting.mos_discharge on" in text(a5.build(1, 0xD9, bytes.fromhex("0101000002006cbe")))
     assert "discharging" in text(a5.build(1, 0x93, b"\x02" + bytes(7)), a5.build(1, 0x90)).splitlines()[1]
 
 

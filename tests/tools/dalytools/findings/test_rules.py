@@ -103,7 +103,7 @@ def test_one_finding_a_board_and_id(tmp_path: Path) -> None:
 
 
 def test_the_boards_own_bluetooth_module_is_no_stranger(tmp_path: Path) -> None:
-    """Field notes, e: what the app says to the module, and the module to the app. No board's, and nobody to take off."""
+    """Field notes, e: what the app says to the module is no board's, and nobody's to take off."""
     talk = [Heard(5, "81100f05000200000000876a"), *asked(6, 0x90, PACK)]
     assert search(capture(tmp_path / "module.pcapng", [*CLEAN, *talk, *LATER])) == []
 
