@@ -11,7 +11,10 @@
 --   ATT           opcode | handle u16 | value    of the opcodes below; little-endian all
 --
 -- A connection is what a Connection Complete event begins, or the capture itself; on it we learn which attributes have
--- a characteristic of Daly's. Packets are read once, in the order of the capture.
+-- a characteristic of Daly's, and from which value on they are (daly_ble_beginning). Packets are read once, in the
+-- order of the capture.
+
+local beginning = require("daly_ble_beginning")
 
 local M = {}
 
@@ -58,7 +61,8 @@ local function connect(host, key)
   host.count = host.count + 1
   local connection = {
     number = host.count, -- of all, in order
-    attributes = {}, -- by handle: whether it is Daly's, as discovered
+    attributes = {}, -- by handle: whether its characteristic is one that Daly has, as discovered
+    begun = false, -- whether a value was Daly's: until then what discovery alone tells is nobody's
     asked = nil, -- the UUID that the last Read By Type request asks for
     pending = {}, -- by direction: the beginning of an L2CAP packet
   }
@@ -172,6 +176,12 @@ local function put_together(host, connection, piece, continues, direction, cut)
   return nil, lost
 end
 
+-- Whether an ATT packet with a value of an attribute of ours is the first of Daly's on its connection.
+local function begins(host, pdu)
+  local value = sub(pdu, 4)
+  return value ~= "" and (host.chosen[u16(pdu, 2)] or beginning.is_one(value))
+end
+
 --- One HCI packet, in the order of the capture, once. `length`: as it was before the snap length; `adapter`: a number;
 -- `unseen`: packets before this one were not read, so that it may be the reply to any request.
 -- Returns, where it has to do with us, its connection and
@@ -197,7 +207,12 @@ function M.read(host, raw, length, adapter, direction, unseen)
   if pdu then
     ours, way = attribute(host, connection, pdu, direction, unseen)
   end
-  if ours then
+  if ours and not connection.begun then
+    connection.begun = begins(host, pdu)
+  end
+  if not connection.begun then
+    return nil
+  elseif ours then
     return connection, sub(pdu, 4), not continues and at + 11 or nil, lost, way
   elseif lost then
     return connection, nil, nil, true, direction == RECEIVED and RECEIVED or SENT

@@ -187,12 +187,13 @@ def test_a_reply_in_values_cut_anywhere(dissect: Dissect) -> None:
 def test_byte_by_byte_with_any_quiet_between(dissect: Dissect) -> None:
     """Silence divides nothing."""
     made = radio(step=0.6)
+    made.write(WRITES, REQUEST)  # 4: Daly begins
     for at in range(0, len(REPLY), 2):
         made.notify(SPEAKS, REPLY[at : at + 2])
     rows = run(dissect, made)
     assert number(rows[-1], "pack.voltage") == 53.3
-    assert kinds(rows) == [""] * 15 + ["frame"]
-    assert numbers(rows[3], "continued_in") == [16]
+    assert kinds(rows) == ["", "", "", "frame", *[""] * 12, "frame"]
+    assert numbers(rows[4], "continued_in") == [17]
 
 
 @pytest.mark.parametrize("passes", PASSES)
@@ -235,24 +236,26 @@ TEXTS = ["AT+VER=?\r\n", "+OK\r\n", "OK\r\n", "ERROR", "HiLink", "AT"]
 
 def test_the_modules_own_text(dissect: Dissect) -> None:
     made = radio()
+    made.write(WRITES, REQUEST)  # 4: Daly begins
     for text in TEXTS:
         made.write(WRITES, text.encode().hex())
         made.notify(SPEAKS, REPLY)
         made.notify(SPEAKS, text.encode().hex())
     rows = run(dissect, made)
-    assert kinds(rows) == ["", "", "", *["foreign", "frame", "foreign"] * len(TEXTS)]
+    assert kinds(rows) == ["", "", "", "frame", *["foreign", "frame", "foreign"] * len(TEXTS)]
     for at, text in enumerate(TEXTS):
-        for row in rows[3 * at + 3], rows[3 * at + 5]:
+        for row in rows[3 * at + 4], rows[3 * at + 6]:
             assert row["daly.foreign"] == ["Bluetooth module"]
             assert row["daly.undecoded"] == [text.encode().hex()]
 
 
 def test_other_text_is_junk(dissect: Dissect) -> None:
     made = radio()
+    made.write(WRITES, REQUEST)  # 4: Daly begins
     others = ["A", "hello", "at+ver", " OK", "AT\x01", "AT\x80"]
     for text in others:
         made.notify(SPEAKS, text.encode("latin-1").hex())
-    assert kinds(run(dissect, made)) == ["", "", "", *["junk"] * len(others)]
+    assert kinds(run(dissect, made)) == ["", "", "", "frame", *["junk"] * len(others)]
 
 
 def test_text_inside_a_frame_is_its_data(dissect: Dissect) -> None:
@@ -270,18 +273,20 @@ def test_text_inside_a_frame_is_its_data(dissect: Dissect) -> None:
 
 def test_text_divides_junk(dissect: Dissect) -> None:
     made = radio()
+    made.write(WRITES, REQUEST)  # 4: Daly begins
     made.notify(SPEAKS, "00")
     made.notify(SPEAKS, b"OK".hex())
     made.notify(SPEAKS, "01" + REPLY)
-    assert kinds(run(dissect, made)) == ["", "", "", "junk", "foreign", "junk+frame"]
+    assert kinds(run(dissect, made)) == ["", "", "", "frame", "junk", "foreign", "junk+frame"]
 
 
 def test_the_modules_modbus(dissect: Dissect) -> None:
     """Function 10 with register 0F05 is the module's on either side, and no exchange (field notes e)."""
     made = radio()
+    made.write(WRITES, REQUEST)  # 4: Daly begins
     made.write(WRITES, with_crc(bytes.fromhex("81100f05000200000000")).hex())
     made.notify(SPEAKS, with_crc(bytes.fromhex("51100f05aaaa")).hex())
-    for row in run(dissect, made)[3:]:
+    for row in run(dissect, made)[4:]:
         assert row["daly.foreign"] == ["Bluetooth module"]
         assert "daly.write" not in row
         assert "daly.unasked" not in row
@@ -298,12 +303,11 @@ def test_a_new_connection_knows_nothing(dissect: Dissect, event: str, passes: st
     getattr(made, event)()
     made.notify(SPEAKS, REPLY)  # not discovered
     made.discover(*DISCOVERED)
-    made.notify(SPEAKS, REPLY[10:])
-    made.notify(SPEAKS, REPLY)
+    made.notify(SPEAKS, REPLY[10:] + REPLY)
     rows = run(dissect, made, **PASSES[passes])
-    assert kinds(rows) == ["", "", "", "frame", "short", "", "", "", "", "junk", "frame"]
-    assert "daly.request_in" not in rows[10]
-    assert "daly.unasked" not in rows[10]
+    assert kinds(rows) == ["", "", "", "frame", "short", "", "", "", "", "junk+frame"]
+    assert "daly.request_in" not in rows[9]
+    assert "daly.unasked" not in rows[9]
 
 
 def test_a_connection_that_failed_is_none(dissect: Dissect) -> None:
