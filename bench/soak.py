@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 PACKETS_A_FILE = 50_000
 USER0 = 147
-WIRES = Choice(tcp_ports=numbers(str(traffic_wires.PORT)))
+WIRES = Choice(tcp_ports=numbers(str(traffic_wires.PORT)), ble_handles=numbers(str(traffic_wires.CHOSEN)))
 
 
 def likely_bus(seed: int) -> Iterator[Made]:

@@ -2,14 +2,16 @@
 """The trouble of tests/traffic.py on other wires (docs/wires.md), packet by packet, as capture files hold it.
 
     tcp   each packet of a side is a segment; some come again, some change places, some (with losses) never come
-    ble   each packet of a side is one or several ATT values, some over several HCI packets; other devices talk as well
+    ble   each packet of a side is one or several ATT values, some over several HCI packets; other devices talk as well,
+          some of other makers on the same attributes; connections break and begin anew, not always with a frame
     can   classic frames, both directions, HKMS registers, inverters, standard, remote, short and strange ones
 
-Deterministic by seed. Ports and attributes: PORTS, HANDLES.
+Deterministic by seed. What a reader has to choose: PORT, CHOSEN.
 """
 
 from __future__ import annotations
 
+import itertools
 import random
 import struct
 from typing import TYPE_CHECKING, NamedTuple
@@ -21,9 +23,9 @@ if TYPE_CHECKING:
 
 RAW_IP, HCI_WITH_DIRECTION, SOCKETCAN = 101, 201, 227
 PORT = 4001
-WRITE, NOTIFY, OTHER = 0x0F, 0x11, 0x20
+WRITE, NOTIFY, OTHER, CHOSEN = 0x0F, 0x11, 0x20, 0x30
+"""Attributes: with Daly's UUIDs, with another, and one that is not in the discovery but chosen by the user."""
 _CONNECTIONS = 4  # as many as tests/traffic.py has interfaces
-HANDLES = f"{WRITE},{NOTIFY}"
 
 
 class OnWire(NamedTuple):
@@ -110,9 +112,11 @@ def _acl(received: int, connection: int, pdu: bytes, sizes: list[int]) -> Iterat
         first = False
 
 
-def _discovery(connection: int) -> Iterator[bytes]:
+def _discovery(connection: int, *, again: bool = False) -> Iterator[bytes]:
+    """Make the discovery of a new connection; again: of the one that there is."""
     complete = struct.pack("<BBBBHBB6sHHHB", 0x3E, 19, 1, 0, connection, 0, 0, bytes(6), 24, 0, 72, 0)
-    yield struct.pack(">I", 1) + b"\x04" + complete
+    if not again:
+        yield struct.pack(">I", 1) + b"\x04" + complete
     yield from _acl(0, connection, struct.pack("<BHHH", 0x08, 1, 0xFFFF, 0x2803), [])
     found = b"".join(
         struct.pack("<HBHH", handle - 1, 0x14, handle, uuid)
@@ -122,9 +126,9 @@ def _discovery(connection: int) -> Iterator[bytes]:
 
 
 def ble(seed: int) -> Iterator[OnWire]:
-    """Yield HCI packets of four connections with a board's module, and of other devices."""
+    """Yield HCI packets of four connections with a board's module, of two with others like it, and of other devices."""
     r = random.Random(seed)
-    for connection in range(4):
+    for connection in range(6):
         for data in _discovery(0x40 + connection):
             yield OnWire(EPOCH_NS - 1_000_000_000, data)
     for made in Traffic(seed).packets():
@@ -133,8 +137,10 @@ def ble(seed: int) -> Iterator[OnWire]:
         connection = 0x40 + made.interface
         board = made.direction - 1 if made.direction else r.randrange(2)
         luck = r.random()
-        if luck < 0.002:
-            for data in _discovery(connection):
+        if luck < 0.005:
+            for data in _discovery(connection, again=luck < 0.001):
+                yield OnWire(made.time_ns, data)
+            for data in itertools.chain.from_iterable(_before(r, connection) for _ in range(r.randrange(4))):
                 yield OnWire(made.time_ns, data)
         elif luck < 0.02:
             for data in _acl(1, connection, struct.pack("<BH", 0x1B, OTHER) + made.data, []):
@@ -143,14 +149,67 @@ def ble(seed: int) -> Iterator[OnWire]:
             text = r.choice((b"AT+VER=?\r\n", b"+VER:1\r\n", b"OK", b"HiLink", b"ERROR x"))
             for data in _acl(board, connection, _head(r, board) + text, []):
                 yield OnWire(made.time_ns, data)
+        elif luck < 0.06:
+            another = 0x44 + r.randrange(2)
+            if r.random() < 0.3:
+                for data in _discovery(another):
+                    yield OnWire(made.time_ns, data)
+            for data in _before(r, another):
+                yield OnWire(made.time_ns, data)
         size = r.choice((20, 20, 244))
         for at in range(0, len(made.data), size):
-            pdu = _head(r, board) + made.data[at : at + size]
-            pieces = list(_acl(board, connection, pdu, [r.choice((7, 12, 27))] if r.random() < 0.05 else []))
-            if len(pieces) > 1 and r.random() < 0.2:
-                del pieces[-1]  # a piece is missing
-            for data in pieces:
+            for data in _value(r, board, connection, _head(r, board) + made.data[at : at + size]):
                 yield OnWire(made.time_ns, data)
+
+
+def _before(r: random.Random, connection: int) -> Iterator[bytes]:
+    """Make a value as it may come before a board's first frame, or instead of one: many near the border of the rule."""
+    board = r.randrange(2)
+    luck = r.random()
+    if luck < 0.5:
+        data = r.choice(_OTHER_MAKERS)
+    elif luck < 0.9:
+        data = r.choice(_HEADS)
+        data = r.choice((data, data + r.randbytes(r.randrange(16)), b"\0" + data, data[: r.randrange(len(data) + 1)]))
+    else:
+        data = r.randbytes(r.randrange(30))
+    head = struct.pack("<BH", 0x1B if board else 0x52, CHOSEN) if r.random() < 0.03 else _head(r, board)
+    return _value(r, board, connection, head + data)
+
+
+_OTHER_MAKERS = (
+    b"ATZ\r",
+    b"\r\rELM327 v1.5\r\r>",
+    b"41 0C 1A F8 \r\r>",
+    b"AT+VER=?\r\n",
+    b"OK",
+    bytes.fromhex("dda50300fffd77"),
+    bytes.fromhex("dd03001b1700000002d003e80000207800000000"),
+    bytes.fromhex("00001048030f020b760b82fbff77"),
+    bytes.fromhex("81100f05000200000000876a"),
+)
+_HEADS = (
+    bytes.fromhex("a5019508"),
+    bytes.fromhex("a5019508010ce40ce50ce600"),
+    bytes.fromhex("a5409008000000000000000000"),
+    bytes.fromhex("d2037c"),
+    bytes.fromhex("5103040ce40ce5"),
+    bytes.fromhex("6003fa"),
+    bytes.fromhex("d203fc"),
+    bytes.fromhex("51030b"),
+    bytes.fromhex("d20300"),
+    bytes.fromhex("81037c"),
+    bytes.fromhex("d203020001fc"),
+    bytes.fromhex("d203000c000157aa"),
+)
+
+
+def _value(r: random.Random, received: int, connection: int, pdu: bytes) -> Iterator[bytes]:
+    """Put an ATT packet into HCI packets, now and then several, and of these now and then not all."""
+    pieces = list(_acl(received, connection, pdu, [r.choice((7, 12, 27))] if r.random() < 0.05 else []))
+    if len(pieces) > 1 and r.random() < 0.2:
+        del pieces[-1]  # a piece is missing
+    yield from pieces
 
 
 def _head(r: random.Random, board: int) -> bytes:

@@ -33,6 +33,7 @@ from dalytools.wire_times import preferences
 from dalytools.wires import choice
 from dalytools.wires.carriers import NOT_READ, Carriers
 from dalytools.wires.choice import Choice
+from dalytools.wires.left_out import LeftOut
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable, Iterator
@@ -79,8 +80,8 @@ class Comparison:
     differences: list[Difference] = field(default_factory=list[Difference])
     broken: str = ""
     """One line, when the capture could be read only in part."""
-    left_out: int = 0
-    """TCP connections that were not compared, see _incomparable."""
+    left_out: list[LeftOut] = field(default_factory=list[LeftOut])
+    """What was not read or not compared."""
 
     def add(self, difference: Difference) -> None:
         """Note a difference."""
@@ -146,7 +147,9 @@ def compare(
     carriers = Carriers(wires)
     serial = DALY_LINK_TYPES.intersection(_link_types(path, carriers, result, listener))
     left_out = _incomparable(tshark, carriers)
-    result.left_out = len(left_out)
+    result.left_out = carriers.left_out
+    if left_out:
+        result.left_out.append(LeftOut("tcp_connections", len(left_out)))
     options = options or Options()
     # Where bytes are lost for good, Wireshark shows nothing behind them while it waits to put segments in order.
     in_order = "FALSE" if carriers.lost else "TRUE"
@@ -197,6 +200,7 @@ def read_alone(
     for carrier in carriers.finish():
         _count(decoder.feed(carrier), result)
     _count(decoder.finish(), result)
+    result.left_out = carriers.left_out
     return result
 
 

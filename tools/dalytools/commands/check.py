@@ -28,7 +28,7 @@ from dalytools.progress import progress_bar
 from dalytools.terminal_text import counted, plain
 from dalytools.tshark import Tshark
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
+from dalytools.wires import choice, left_out
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -228,10 +228,8 @@ def _check(name: str, asked: _Asked, tshark: Tshark | None, known: Baseline | No
     checked.findings, checked.known = weighed(
         everything, asked.severity, asked.ignored, known.keys if known is not None else ()
     )
-    if result.left_out:
-        left_out = counted(result.left_out, "TCP connection")
-        said = f"{plain(name)}: segments are lost; {left_out} with late or repeated ones not compared"
-        print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201
+    checked.left_out = result.left_out
+    left_out.say("check", name, result.left_out)
     if result.broken:
         said = plain(f"{result.broken}; compared what is there")
         print(f"dalyshark check: {said}", file=sys.stderr)  # noqa: T201

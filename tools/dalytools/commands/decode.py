@@ -21,7 +21,7 @@ from dalytools.progress import progress_bar
 from dalytools.record_lines import line
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_binary_file, whole_file
-from dalytools.wires import choice
+from dalytools.wires import choice, left_out
 from dalytools.wires.carried import carried
 from dalytools.wires.carriers import NOT_READ, Carriers
 
@@ -220,6 +220,7 @@ def _decode_file(
                 if span.holds(record.time_ns):
                     put(name, record)
             shown += len(batch)
+    left_out.say("decode", name, carriers.left_out)
     if others:
         names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
         if passed == packets:

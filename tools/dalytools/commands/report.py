@@ -19,7 +19,7 @@ from dalytools.report.collect import Collected
 from dalytools.report.page import page
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
+from dalytools.wires import choice, left_out
 from dalytools.wires.carried import carried
 from dalytools.wires.carriers import Carriers
 
@@ -82,6 +82,7 @@ def _read(name: str, args: argparse.Namespace, collected: Collected, search: Sea
         for carrier in carried(name, carriers, problems, packet=search.packet, advance=advance):
             take(decoder.feed(carrier))
         take(decoder.finish())
+    left_out.say("report", name, carriers.left_out)
 
 
 def _library() -> str:

@@ -21,7 +21,7 @@ from dalytools.survey.survey import Survey
 from dalytools.survey.wanted import Wanted
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
-from dalytools.wires import choice
+from dalytools.wires import choice, left_out
 from dalytools.wires.carried import carried
 from dalytools.wires.carriers import Carriers
 
@@ -141,3 +141,4 @@ def _read(name: str, options: Options, wires: Choice | None, survey: Survey, pro
             take(decoder.feed(carrier))
         take(decoder.finish())
         survey.end_of_file()
+    left_out.say("survey", name, carriers.left_out)

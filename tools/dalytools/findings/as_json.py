@@ -43,6 +43,7 @@ def _file(checked: Checked) -> dict[str, object]:
         "kinds": checked.kinds,
         "differences": checked.differences,
         "known": checked.known,
+        "left_out": [{"what": one.what, "count": one.count, "text": str(one)} for one in checked.left_out],
         "findings": [_finding(finding) for finding in checked.findings],
     }
 

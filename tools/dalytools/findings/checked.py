@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from dalytools.comparison import Comparison
+    from dalytools.wires.left_out import LeftOut
 
 
 @dataclass(slots=True)
@@ -31,6 +32,7 @@ class Checked:
     """The first differences of the two readings, a line each."""
     known: int = 0
     """Findings left out because a baseline has them."""
+    left_out: list[LeftOut] = field(default_factory=list["LeftOut"])
     broken: str = ""
     """One line, when the file could be read only in part."""
     problem: str = ""

@@ -3,9 +3,10 @@
 
     testsuites
       testsuite    a file; an error of its own case "read" when it could not be read
+        property   how many of a kind were left out
         testcase   a rule; a failure holds all its findings at or above the limit
         system-out findings below the limit
-        system-err why a file was read in part only
+        system-err what was left out, why a file was read in part only
 
 Elements and attributes stand where the schema of Ant's JUnit task has them; Jenkins, GitLab and Azure read the same.
 """
@@ -43,7 +44,9 @@ def text(files: Sequence[Checked], fail_on: Severity | None, ignored: Collection
 def _suite(number: int, checked: Checked, fail_on: Severity | None, ignored: Collection[str], now: str) -> ET.Element:
     failing = checked.failing(fail_on)
     suite = ET.Element("testsuite", {"name": plain(checked.file), "package": "dalyshark", "id": str(number)})
-    ET.SubElement(suite, "properties")
+    properties = ET.SubElement(suite, "properties")
+    for one in checked.left_out:
+        ET.SubElement(properties, "property", {"name": f"left_out.{one.what}", "value": str(one.count)})
     cases = errors = failures = 0
     if checked.problem or checked.broken:
         cases, errors = 1, 1
@@ -64,7 +67,8 @@ def _suite(number: int, checked: Checked, fail_on: Severity | None, ignored: Col
                 ET.SubElement(case, "failure", attributes).text = "\n".join(_lines(finding) for finding in mine)
     others = [finding for finding in checked.findings if finding not in failing]
     ET.SubElement(suite, "system-out").text = "\n".join(_lines(finding) for finding in others)
-    ET.SubElement(suite, "system-err").text = plain(checked.broken)
+    said = [*map(str, checked.left_out), *([checked.broken] if checked.broken else [])]
+    ET.SubElement(suite, "system-err").text = "\n".join(map(plain, said))
     suite.attrib.update(
         {
             "tests": str(cases),

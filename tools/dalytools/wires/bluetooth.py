@@ -7,8 +7,8 @@
 
     data  02 | connection (12 bits), PB flags | length u16 | L2CAP: length u16, channel u16 | ATT ...
 
-Low byte first, but where said. ATT packets over several data packets are put together. Which attributes are Daly's:
-docs/wires.md, 3.
+Low byte first, but where said. ATT packets over several data packets are put together. Which attributes are Daly's, and
+from which value on: docs/wires.md, 3.
 """
 
 # scapy's fields have no types that a checker could follow.
@@ -21,6 +21,7 @@ import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+from dalyref.beginning import begins
 from dalyref.packet import Packet
 from dalytools.extra import missing
 
@@ -62,7 +63,7 @@ _MOST_TOLD: Final = 16  # of others, in a message
 
 
 @dataclass(slots=True)
-class _Begun:
+class _Unfinished:
     """An L2CAP packet of which more is to come."""
 
     data: bytes = b""
@@ -75,10 +76,12 @@ class _Connection:
 
     name: str
     handles: set[int] = field(default_factory=set[int])
-    """Of Daly's attributes."""
+    """Of attributes with Daly's UUIDs."""
+    begun: bool = False
+    """They are Daly's: a value of its own was seen, or one of a handle that the user chose."""
     asks_characteristics: bool = False
     """The newest Read By Type request is for 2803."""
-    begun: dict[int, _Begun] = field(default_factory=dict[int, _Begun])  # by direction
+    unfinished: dict[int, _Unfinished] = field(default_factory=dict[int, _Unfinished])  # by direction
     lost: set[Direction] = field(default_factory=set["Direction"])
     """Sides of Daly's attributes that a packet is missing of."""
 
@@ -94,7 +97,9 @@ class Bluetooth:
         self.found = False
         """A value of Daly's was seen."""
         self.others: set[int] = set()
-        """Some handles of attributes that carry values and are not known as Daly's."""
+        """Some handles of attributes that carry values which are not known as Daly's."""
+        self.before = 0
+        """Values of attributes with Daly's UUIDs that came before one of Daly's, and are left out."""
 
     def values(self, packet: Packet) -> Sequence[Packet]:
         """Return the value of Daly's that a packet holds or completes; most hold none."""
@@ -135,32 +140,38 @@ class Bluetooth:
         word, length = struct.unpack_from("<HH", data)
         data = data[4 : 4 + length]
         connection = self._connection(packet.interface, adapter, word & 0xFFF)
-        begun = connection.begun.pop(received, None)
+        whole = connection.unfinished.pop(received, None)
         if word >> 12 & 3 == 1:
-            if begun is None:
+            if whole is None:
                 return ()
-            begun.data += data
+            whole.data += data
         else:
-            if begun is not None:
-                self._lose(connection, begun)
-            begun = _Begun(data, 4 + int.from_bytes(data[:2], "little"))
-        if len(data) < length or len(begun.data) > begun.length:  # cut off by the snap length, or not a part of it
-            self._lose(connection, begun)
-        elif len(begun.data) < begun.length:
-            connection.begun[received] = begun
-        elif int.from_bytes(begun.data[2:4], "little") == _ATT_CHANNEL:
-            return self._att(packet, connection, received, begun.data[4:])
+            if whole is not None:
+                self._lose(connection, whole)
+            whole = _Unfinished(data, 4 + int.from_bytes(data[:2], "little"))
+        if len(data) < length or len(whole.data) > whole.length:  # cut off by the snap length, or not a part of it
+            self._lose(connection, whole)
+        elif len(whole.data) < whole.length:
+            connection.unfinished[received] = whole
+        elif int.from_bytes(whole.data[2:4], "little") == _ATT_CHANNEL:
+            return self._att(packet, connection, received, whole.data[4:])
         return ()
 
-    def _lose(self, connection: _Connection, begun: _Begun) -> None:
+    def _lose(self, connection: _Connection, part: _Unfinished) -> None:
         """Note that a packet stays incomplete: where it is one of Daly's, bytes are missing."""
-        if int.from_bytes(begun.data[2:4], "little") == _ATT_CHANNEL:
-            direction = self._side(connection, begun.data[4:])
+        if connection.begun and int.from_bytes(part.data[2:4], "little") == _ATT_CHANNEL:
+            direction = self._side(connection, part.data[4:])
             if direction:
                 connection.lost.add(direction)
 
+    def _begins(self, connection: _Connection, pdu: bytes) -> bool:
+        """Tell whether a connection's attributes are Daly's, now that this value has come."""
+        if not connection.begun:
+            connection.begun = int.from_bytes(pdu[1:3], "little") in self._handles or begins(pdu[3:])
+        return connection.begun
+
     def _side(self, connection: _Connection, pdu: bytes) -> Direction:
-        """Return which side's value an ATT packet holds, where it is an attribute of Daly's; else nothing."""
+        """Return which side's value an ATT packet holds, where its attribute may be Daly's; else nothing."""
         opcode, handle = pdu[0] if pdu else 0, int.from_bytes(pdu[1:3], "little")
         if len(pdu) < 3 or not (handle in connection.handles or handle in self._handles):
             return ""
@@ -178,12 +189,15 @@ class Bluetooth:
 
     def _att(self, packet: Packet, connection: _Connection, received: int, pdu: bytes) -> Sequence[Packet]:
         opcode = pdu[0] if pdu else 0
-        direction = self._side(connection, pdu)
-        if direction:
-            self.found = True
-            return (self._value(packet, connection, pdu[3:], direction),) if len(pdu) > 3 else ()
-        if (opcode in _WRITES or opcode in _NOTICES) and len(pdu) > 3 and len(self.others) < _MOST_TOLD:
-            self.others.add(int.from_bytes(pdu[1:3], "little"))
+        if (opcode in _WRITES or opcode in _NOTICES) and len(pdu) > 3:
+            direction = self._side(connection, pdu)
+            if direction and self._begins(connection, pdu):
+                self.found = True
+                return (self._value(packet, connection, pdu[3:], direction),)
+            if direction:
+                self.before += 1
+            if len(self.others) < _MOST_TOLD:
+                self.others.add(int.from_bytes(pdu[1:3], "little"))
         if opcode == _READ_BY_TYPE and received != 1:
             connection.asks_characteristics = pdu[5:] == _CHARACTERISTIC.to_bytes(2, "little")
         elif received == 0:

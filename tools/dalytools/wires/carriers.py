@@ -6,10 +6,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from dalyref.packet import SERIAL_LINK_TYPES
+from dalytools.terminal_text import counted
 from dalytools.wires import can
 from dalytools.wires.bluetooth import LINK_TYPES as BLUETOOTH
 from dalytools.wires.bluetooth import Bluetooth
 from dalytools.wires.choice import Choice
+from dalytools.wires.left_out import LeftOut
 from dalytools.wires.network import LINK_TYPES as NETWORK
 from dalytools.wires.tcp import Tcp
 
@@ -65,6 +67,12 @@ class Carriers:
             return ""
         if self._bluetooth.others:
             handles = ", ".join(map(str, sorted(self._bluetooth.others)))
+            if self._bluetooth.before:
+                values = counted(self._bluetooth.before, "value")
+                return (
+                    f"no frame of Daly's in {values} of Bluetooth attributes fff1, fff2, ff01 and ff02, which other "
+                    f"makers use too; if one is Daly's, say which with --ble-handles, of {handles}"
+                )
             return (
                 "no Bluetooth attribute in it is known to be Daly's: its discovery is not in the capture; "
                 f"say which it is with --ble-handles, of {handles}"
@@ -75,6 +83,12 @@ class Carriers:
                 "there are: choose with --tcp-ports"
             )
         return ""
+
+    @property
+    def left_out(self) -> list[LeftOut]:
+        """Tell what was found so far and left out, beside what `nothing` says."""
+        before = self._bluetooth.before
+        return [LeftOut("ble_values", before)] if before and not self.nothing else []
 
     def of(self, packet: Packet) -> Sequence[Packet]:
         """Return what has come for the decoder: of this packet, and of those that waited for it; often nothing."""

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Daly's values in HCI captures; packets written by hand from the Bluetooth papers (docs/wires.md, 3)."""
+"""Daly's values in HCI captures (docs/wires.md, 3)."""
 
 from __future__ import annotations
 
-import struct
 import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from tests.tools.dalytools.made import ANSWER, ASK, EPOCH_NS, a5
+from tests.tools.dalytools.made import ANSWER, ASK, a5
+from tests.tools.dalytools.wires.air import RECEIVED, SENT, TOLD, Air, connected, data, long_form
 
 from dalyref.decoder import decode
 from dalyref.packet import Packet
@@ -16,76 +16,10 @@ from dalytools.cli import main
 from dalytools.problem import Problem
 from dalytools.wires.bluetooth import HCI, HCI_WITH_DIRECTION, LINUX_MONITOR
 from dalytools.wires.carriers import Carriers
-from dalytools.wires.choice import Choice, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
-
-    from dalyref.packet import Direction
-
-SENT, RECEIVED = 0, 1
-WRITE, NOTIFY = 0x0F, 0x11
-HANDLE = 0x40
-
-# Read By Type 2803 from 0001 to FFFF; two characteristics: declared at 000E and 0010, fff2 at 000F, fff1 at 0011
-ASKED, TOLD = "080100ffff0328", "0907" + "0e00040f00f2ff" + "1000101100f1ff"
-LONG = "00001000800000805f9b34fb"
-"""The end of a short UUID's long form: xxxx-0000-1000-8000-00805F9B34FB, high byte first."""
-
-
-def long_form(short: str) -> str:
-    return bytes.fromhex("0000" + short + LONG)[::-1].hex()
-
-
-def data(pdu: str, *, handle: int = HANDLE, first: bool = True, whole: int | None = None) -> bytes:
-    """One HCI data packet, without its kind. whole: length of the L2CAP packet, where more of it follows."""
-    body = bytes.fromhex(pdu)
-    if first:
-        body = struct.pack("<HH", len(body) if whole is None else whole, 4) + body
-    return struct.pack("<HH", handle | (0x2000 if first else 0x1000), len(body)) + body
-
-
-def connected(handle: int = HANDLE, *, enhanced: bool = False, status: int = 0) -> bytes:
-    """LE (Enhanced) Connection Complete, without its kind: subevent, status, handle, and the rest as zeros."""
-    rest = bytes(27 if enhanced else 15)
-    inner = struct.pack("<BBH", 0x0A if enhanced else 0x01, status, handle) + rest
-    return bytes((0x3E, len(inner))) + inner
-
-
-class Air:
-    """A capture in the making."""
-
-    def __init__(self, link_type: int = HCI_WITH_DIRECTION) -> None:
-        self.link_type = link_type
-        self.packets: list[Packet] = []
-
-    def put(self, received: int, body: bytes, *, event: bool = False, adapter: int = 0, at_ms: float = 0) -> None:
-        kind = 4 if event else 2
-        direction: Direction = ""
-        if self.link_type == LINUX_MONITOR:
-            whole = struct.pack(">HH", adapter, 3 if event else 4 + received) + body
-        elif self.link_type == HCI_WITH_DIRECTION:
-            whole = struct.pack(">IB", received, kind) + body
-        else:
-            whole, direction = bytes((kind,)) + body, "inbound" if received else "outbound"
-        number = len(self.packets) + 1
-        time_ns = EPOCH_NS + round((at_ms or 10 * number) * 1e6)
-        self.packets.append(
-            Packet(number=number, time_ns=time_ns, data=whole, direction=direction, link_type=self.link_type)
-        )
-
-    def discover(self, told: str = TOLD, adapter: int = 0) -> None:
-        self.put(SENT, data(ASKED), adapter=adapter)
-        self.put(RECEIVED, data(told), adapter=adapter)
-
-    def speak(self, adapter: int = 0) -> None:
-        self.put(SENT, data("520f00" + ASK.hex()), adapter=adapter)
-        self.put(RECEIVED, data("1b1100" + ANSWER.hex()), adapter=adapter)
-
-    def values(self, handles: str = "") -> list[tuple[int, str, bytes]]:
-        carriers = Carriers(Choice(ble_handles=numbers(handles)) if handles else None)
-        return [(one.number, one.direction, one.data) for each in self.packets for one in carriers.of(each)]
 
 
 @pytest.mark.parametrize("link_type", [HCI, HCI_WITH_DIRECTION, LINUX_MONITOR])
@@ -196,11 +130,12 @@ def test_a_frame_over_several_notifications_and_several_in_one() -> None:
 def test_the_modules_own_text_is_named() -> None:
     air = Air()
     air.discover()
+    air.speak()
     air.put(SENT, data("520f00" + b"AT+VER=?\r\n".hex()))
     air.put(RECEIVED, data("1b1100" + b"+VER:1.0\r\n".hex()))
     carriers = Carriers()
     records = list(decode(one for each in air.packets for one in carriers.of(each)))
-    assert [record.fields["daly.foreign"] for record in records] == ["Bluetooth module"] * 2
+    assert [record.fields["daly.foreign"] for record in records[2:]] == ["Bluetooth module"] * 2
 
 
 def test_cut_off_and_damaged_packets_are_no_error() -> None:

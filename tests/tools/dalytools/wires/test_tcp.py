@@ -25,6 +25,7 @@ from dalytools.comparison import compare
 from dalytools.tshark import Tshark
 from dalytools.wires.carriers import Carriers
 from dalytools.wires.choice import Choice, numbers
+from dalytools.wires.left_out import LeftOut
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -294,7 +295,7 @@ def test_both_readings_agree(way: str, tmp_path: Path) -> None:
     path = save(tmp_path / "tcp.pcapng", segments)
     with Tshark() as tshark:
         found = compare(tshark, path, wires=CHOICE)
-    assert (found.differences, found.left_out, found.broken) == ([], 0, "")
+    assert (found.differences, found.left_out, found.broken) == ([], [], "")
     frames = {"lost": 5, "incomplete at the end": 3}.get(way, 4 if shift else 7)
     assert found.kinds.get("frame") == frames
     assert found.kinds.get("bad_checksum", 0) == (1 if shift else 0)
@@ -319,7 +320,7 @@ def test_late_segments_beside_a_connection_that_lost_some_are_left_out(tmp_path:
     path = save(tmp_path / "tcp.pcapng", [*lost, *late])
     with Tshark() as tshark:
         found = compare(tshark, path, wires=CHOICE)
-    assert (found.differences, found.left_out) == ([], 1)
+    assert (found.differences, found.left_out) == ([], [LeftOut("tcp_connections", 1)])
     assert found.kinds["frame"] == 4  # of the first: two of its six are hit by the loss
 
 
@@ -330,7 +331,7 @@ def test_repeated_segments_beside_lost_ones(tmp_path: Path) -> None:
     with Tshark() as tshark:
         found = compare(tshark, path, wires=CHOICE)
         early = tshark.version.startswith("4.0.")
-    assert (found.differences, found.left_out) == ([], 0 if early else 1)
+    assert (found.differences, found.left_out) == ([], [] if early else [LeftOut("tcp_connections", 1)])
 
 
 def test_a_connection_with_late_and_lost_segments_is_left_out(
@@ -339,7 +340,7 @@ def test_a_connection_with_late_and_lost_segments_is_left_out(
     cuts = [(0, 13), (26, 39), (13, 26), (45, 78)]
     path = save(tmp_path / "tcp.pcapng", [ip(SERVER, 1000 + a, STREAM[a:b]) for a, b in cuts])
     assert main(["check", "--no-rules", "--tcp-ports", "8899", str(path)]) == 0
-    assert "segments are lost; 1 TCP connection with late or repeated ones not compared" in capsys.readouterr().err
+    assert "tcp.pcapng: 1 TCP connection not compared: where a capture has lost segments, " in capsys.readouterr().err
     assert main(["check", "--no-dissector", "--tcp-ports", "8880-8899", str(path)]) == 0
     assert main(["check", str(path)]) == 2
     assert "with --tcp-ports, TCP" in capsys.readouterr().err
