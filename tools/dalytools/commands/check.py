@@ -123,7 +123,7 @@ class _Asked:
         fail_on: str = args.fail_on or settings.fail_on or str(Severity.ERROR)
         return cls(
             wire_times.read(args, base),
-            choice.read(args),
+            choice.read(args, settings.wires),
             limits,
             settings.severity,
             frozenset((*settings.ignore, *args.ignore)),

@@ -13,6 +13,8 @@
     [wire]                       # the constants of docs/records.md, as the options are called
     baud = 9600
     reply = 1.0
+    tcp-ports = "8899"           # where Daly's bytes are: as --tcp-ports and --ble-handles
+    ble-handles = [0x0f, 0x11]
 
 A key that is not known is an error: a rule misspelt would be a rule not checked. The command line goes first.
 """
@@ -28,6 +30,8 @@ from dalyref.options import Options
 from dalytools.findings.finding import SEVERITIES, Severity
 from dalytools.findings.rules import RULES
 from dalytools.problem import Problem
+from dalytools.wires import choice
+from dalytools.wires.choice import Choice
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -49,6 +53,8 @@ class Config:
     severity: dict[str, Severity] = field(default_factory=dict[str, Severity])
     wire: dict[str, float] = field(default_factory=dict[str, float])
     """Constants of the reading, by the names of ``Options``."""
+    wires: Choice = field(default_factory=Choice)
+    """What captures do not say of their wires."""
 
 
 _WIRE = {("silence" if one.name == "quiet" else one.name.replace("_", "-")): one.name for one in fields(Options)}
@@ -94,7 +100,7 @@ class _Reading:
         check = self._table(document, "check", "")
         self._only(check, ("fail-on", "ignore", "late-after", "damaged-limit", "severity"), "check.")
         wire = self._table(document, "wire", "")
-        self._only(wire, _WIRE, "wire.")
+        self._only(wire, (*_WIRE, *choice.KEYS), "wire.")
         severity = self._table(check, "severity", "check.")
         self._only(severity, RULES, "check.severity.")
         return Config(
@@ -107,7 +113,8 @@ class _Reading:
                 name: SEVERITIES[self._choice(value, f"check.severity.{name}", tuple(SEVERITIES))]
                 for name, value in severity.items()
             },
-            {_WIRE[key]: self._number(value, f"wire.{key}") for key, value in wire.items()},
+            {_WIRE[key]: self._number(value, f"wire.{key}") for key, value in wire.items() if key in _WIRE},
+            choice.checked({key: wire[key] for key in choice.KEYS if key in wire}, f"{self._path}: wire."),
         )
 
     def _table(self, inside: dict[str, object], key: str, where: str) -> dict[str, object]:

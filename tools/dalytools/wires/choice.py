@@ -6,7 +6,12 @@ from __future__ import annotations
 import argparse
 import re
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final, cast
+
+from dalytools.problem import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 _LAST: Final = 0xFFFF
 _ONE = re.compile(r"(0x[0-9a-fA-F]{1,4}|[0-9]{1,5})(?:-(0x[0-9a-fA-F]{1,4}|[0-9]{1,5}))?")
@@ -52,18 +57,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options; ``read`` gives them."""
     parser.add_argument(
         "--tcp-ports",
-        type=numbers,
+        type=ports,
         default=argparse.SUPPRESS,
         metavar="PORTS",
         help="ports of serial servers that carry the bytes of a bus, such as 8899 or 4001,8890-8899",
     )
     parser.add_argument(
         "--ble-handles",
-        type=numbers,
+        type=handles,
         default=argparse.SUPPRESS,
         metavar="HANDLES",
         help="handles of Daly's Bluetooth attributes, such as 0x0f,0x11, where the capture began after the discovery",
     )
+
+
+def checked(values: Mapping[str, object], said: str) -> Choice:
+    """Return what a file says: by `KEYS`, a number, a text as the options have it, or a list of these.
+
+    said: what to begin a complaint with. Raises Problem.
+    """
+    chosen: dict[str, Numbers] = {}
+    for key, value in values.items():
+        name, read_text = KEYS[key]
+        some = cast("list[object]", value) if isinstance(value, list) else [value]
+        text = ",".join(str(one) if isinstance(one, (int, str)) else "?" for one in some)
+        try:
+            chosen[name] = read_text(text)
+        except argparse.ArgumentTypeError as error:
+            raise Problem(f"{said}{key}: {error}") from None
+    return Choice(**chosen)
 
 
 def read(args: argparse.Namespace, base: Choice | None = None) -> Choice:
@@ -73,19 +95,33 @@ def read(args: argparse.Namespace, base: Choice | None = None) -> Choice:
     return Choice(given.get("tcp_ports", base.tcp_ports), given.get("ble_handles", base.ble_handles))
 
 
-def numbers(text: str) -> Numbers:
-    """Read numbers and ranges. Raises ArgumentTypeError, a line, where they are none."""
+def ports(text: str) -> Numbers:
+    """Read TCP ports. Raises ArgumentTypeError, a line, where they are none."""
+    return numbers(text, like="8899 and 4001,8890-8899")
+
+
+def handles(text: str) -> Numbers:
+    """Read Bluetooth handles, in the same way."""
+    return numbers(text, like="17 and 0x0f,0x11")
+
+
+def numbers(text: str, *, like: str = "7 and 1,3-5") -> Numbers:
+    """Read numbers and ranges. Raises ArgumentTypeError, a line with examples, where they are none."""
     ranges: list[range] = []
     for part in text.split(","):
         found = _ONE.fullmatch(part.strip())
         first, last = (_number(found[1]), _number(found[2] or found[1])) if found else (0, 0)
         if not 1 <= first <= last <= _LAST:
-            message = f"{text[:50]!r} is no list of numbers from 1 to {_LAST}; 8899 and 4001,8890-8899 are"
+            message = f"{text[:50]!r} is no list of numbers from 1 to {_LAST}; {like} are"
             raise argparse.ArgumentTypeError(message)
         ranges.append(range(first, last + 1))
     if len(ranges) > _MOST_RANGES:
         raise argparse.ArgumentTypeError(f"{len(ranges)} ranges are too many; {_MOST_RANGES} are the most")
     return Numbers(tuple(ranges))
+
+
+KEYS: Final = {"tcp-ports": ("tcp_ports", ports), "ble-handles": ("ble_handles", handles)}
+"""The same in a file of settings: what of `Choice` it is, and what reads it."""
 
 
 def _number(text: str) -> int:
