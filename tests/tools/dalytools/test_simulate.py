@@ -111,6 +111,14 @@ def test_list_and_example(tmp_path: Path) -> None:
     assert b"on the wire in 1 s, as uart" in done.stderr
 
 
+def test_bytes_of_a_serial_line_are_counted_on_no_other_wire(tmp_path: Path) -> None:
+    """Two requests and replies, 4 frames of 13 bytes; on CAN they are not 13 bytes long."""
+    words = ("-w", tmp_path / "x.pcapng", "--duration", "0.15")
+    told = simulated(*words).stderr.decode()
+    assert told == f"{tmp_path}/x.pcapng: 4 packets, 52 bytes on the wire in 0.15 s, as uart\n"
+    assert simulated(*words, "--wire", "can").stderr.decode() == f"{tmp_path}/x.pcapng: 4 packets in 0.15 s, as can\n"
+
+
 def test_a_capture_goes_down_a_pipe_and_needs_no_file() -> None:
     one = simulated("-w", "-", "--duration", "2", "--boards", "1-2")
     two = simulated("-w", "-", "--duration", "2", "--boards", "1-2")

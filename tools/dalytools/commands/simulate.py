@@ -208,9 +208,9 @@ def _write(args: argparse.Namespace, made: Scenario) -> int:
         made, args.output, wire=wire, seconds=seconds, file_format=args.file_format, truth=args.truth
     )
     where = "standard output" if args.output == "-" else args.output
+    size = f", {counted(written.wire_bytes, 'byte')} on the wire" if wire == "uart" else ""  # of A5 and Modbus alone
     print(  # noqa: T201
-        f"{where}: {counted(written.packets, 'packet')}, {counted(written.wire_bytes, 'byte')} on the wire in "
-        f"{seconds or made.duration_s:g} s, as {wire}",
+        f"{where}: {counted(written.packets, 'packet')}{size} in {seconds or made.duration_s:g} s, as {wire}",
         file=sys.stderr,
     )
     return 0
