@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from bench.table import Result
 
-NAMES = ("dissector", "wires", "reference", "bulk", "sniffer", "evidence", "replug", "files")
+NAMES = ("dissector", "wires", "reference", "bulk", "sniffer", "evidence", "replug", "files", "recall")
 
 
 def _positive(text: str) -> int:
@@ -36,11 +36,12 @@ def main() -> int:
     parser.add_argument("--frames", type=_positive, default=default.frames, help="frames in a capture (%(default)s)")
     parser.add_argument("--seconds", type=_positive, default=default.seconds, help="time on the bus (%(default)g)")
     parser.add_argument("--repeat", type=_positive, default=default.repeat, help="times each side runs (%(default)s)")
+    parser.add_argument("--faults", type=_positive, default=default.faults, help="put in for recall (%(default)s)")
     args = parser.parse_args()
     unknown = [name for name in args.names if name not in NAMES]
     if unknown:
         parser.error(f"there is no measurement {unknown[0]}; there are {', '.join(NAMES)}")
-    options = Options(args.frames, float(args.seconds), args.repeat)
+    options = Options(args.frames, float(args.seconds), args.repeat, args.faults)
     system = (
         platform.freedesktop_os_release().get("PRETTY_NAME", "") if sys.platform == "linux" else platform.platform()
     )

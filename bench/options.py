@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """frames: in a capture; seconds: on the bus; repeat: times each side is measured, in turn."""
+    """frames: in a capture; seconds: on the bus; repeat: times each side is measured, in turn; faults: put in."""
 
     frames: int = 1_000_000
     seconds: float = 60.0
     repeat: int = 3
+    faults: int = 50_000

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 STEP_A = 1.0
 """Currents further apart are another load (docs/records.md 11)."""
-_AGE_NS = 10_000_000_000
 _MOST_HELD, _MOST_BOARDS = 256, 1024
 
 Board = tuple[str, int | None, int | None]
@@ -45,7 +44,7 @@ class Load:
         self._known: dict[Board, _Known] = {}
         self._held: dict[Board, list[Held]] = {}
 
-    def judged(self, board: Board, fields: Fields, time_ns: int) -> list[Held]:
+    def judged(self, board: Board, fields: Fields) -> list[Held]:
         """Take a reply of a board; return contradictions before it that no step of the load explains."""
         if board not in self._known and len(self._known) >= _MOST_BOARDS:
             return []
@@ -54,9 +53,7 @@ class Load:
         out: list[Held] = []
         held = self._held.get(board)
         if held:
-            if held[-1].time_ns + _AGE_NS < time_ns:
-                out, held = held, []
-            elif state is not None and known.state is not None and state != known.state:
+            if state is not None and known.state is not None and state != known.state:
                 held = []
             elif isinstance(amperes, float) and known.amperes is not None:
                 out, held = ([] if abs(amperes - known.amperes) > STEP_A else held), []

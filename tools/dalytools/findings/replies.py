@@ -78,6 +78,8 @@ class Replies(Watch):
                 asked = self._asked.get(late_to)
                 waited = (record.time_ns - asked[0]) / 1e9 if asked else 0.0
             late.worst_s = max(late.worst_s, float(str(waited)))
+        if late_to is not None:
+            return  # its own request was given up: that some other board is asked by now is no sign
         if "daly.other_board" in fields:
             wrong = self._wrong[place]
             wrong.tally.add(record.number, record.time_ns)
@@ -86,7 +88,7 @@ class Replies(Watch):
             meant = asked[1] if asked else self._newest.get(number(fields, "daly.data_id") or 0)
             if meant is not None:
                 wrong.meant.add(meant)
-        elif "daly.unasked" in fields and late_to is None:
+        elif "daly.unasked" in fields:
             self._unasked[place].add(record.number, record.time_ns)
 
     def findings(self) -> Iterator[Finding]:

@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections import deque
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
 from dalytools.findings.load import Held, Load
-from dalytools.findings.place import REPLY, Place, address_of, number, place_of, words
+from dalytools.findings.place import REPLY, REQUEST, Place, address_of, number, place_of, words
 from dalytools.findings.rules import found
 from dalytools.findings.watch import Groups, Watch
+from dalytools.findings.zero_run import ZeroRun
 from dalytools.terminal_text import counted
 
 if TYPE_CHECKING:
@@ -25,12 +27,9 @@ if TYPE_CHECKING:
 _EXAMPLES = 3
 _OF_LOAD = frozenset(("pack_voltage", "cell_max", "cell_min"))
 """Contradictions that a step of the load between the two replies explains."""
-_NEVER_ZERO = frozenset((0x90, 0x91, 0x94, 0x95))
-"""Of these eight bytes of zero say what can't be: 0 V, cell number 0, no cells, frame number 0."""
-_NUMBERED = frozenset((0x95, 0x96))
-"""Of these zeros behind the frame number may be slots that are not used."""
-_ZERO = "00" * 8
-_MOST_ZERO = 64
+_MOST_D2, _MOST_ALONE = 64, 256
+_SETS_SOC = 0x21  # docs/protocol.md, a.3
+_RECENT_NS = 10_000_000_000  # docs/records.md 11
 _FAULT = "daly.fault."
 _STATES = frozenset(("mos_off_by_command", "charging_cabinet_offline"))  # docs/protocol.md, a.98: no faults
 _SAYS = {
@@ -66,10 +65,13 @@ class Values(Watch):
         self._contradictions = Groups(_Contradiction)
         self._load = Load()
         self._zero = Groups(Tally)
-        self._runs = Groups(list[tuple[int, int] | None])
-        """Replies of zeros in a row, packet and time; None: they were counted, and so is what follows."""
+        self._runs = Groups(ZeroRun)
         self._faults = Groups(_Fault)
-        self._told: set[tuple[str, object, object]] = set()  # boards whose faults were told before
+        self._d2: deque[str] = deque(maxlen=_MOST_D2)  # packets of its newest replies
+        self._nothings: deque[str] = deque(maxlen=_MOST_D2)  # packets of the newest replies of zeros
+        self._soc_set: dict[str, int] = {}  # when a host last wrote it, by bus
+        self._boards: dict[str, set[int]] = {}  # who has replied in A5, by bus
+        self._alone: dict[str, list[tuple[Board, Held]]] = {}  # SOC against D2, while one board is heard, by bus
         self._unknown = Groups(Tally)
 
     def record(self, record: Decoded, bus: str) -> None:
@@ -80,6 +82,12 @@ class Values(Watch):
         if "daly.unknown_id" in fields:
             asked = "reply" if fields.get("daly.direction") == REPLY else "request"
             self._unknown[place_of(record, bus, asked)].add(record.number, record.time_ns)
+        if fields.get("daly.direction") == REQUEST:
+            if "daly.write" in fields and (fields.get("daly.data_id") == _SETS_SOC or "daly.setting.soc" in fields):
+                self._soc_set[bus] = record.time_ns
+            if "daly.unanswered" in fields:
+                place = _board(record, bus)
+                self._cleared(place, self._runs[place].unanswered(fields.get("daly.data_id")))
         if fields.get("daly.direction") != REPLY:
             return
         self._contradiction(record, bus, fields)
@@ -89,11 +97,29 @@ class Values(Watch):
 
     def _contradiction(self, record: Decoded, bus: str, fields: Fields) -> None:
         board = bus, number(fields, "daly.board"), address_of(fields)
-        for held in self._load.judged(board, fields, record.time_ns):
+        dialect = fields.get("daly.dialect")
+        if _nothing(fields):
+            self._nothings.append(str(record.number))
+        if dialect == "d2":
+            self._d2.append(str(record.number))
+        elif dialect == "a5" and board[1] is not None:
+            heard = self._boards.setdefault(bus, set())
+            heard.add(board[1])
+            if len(heard) > 1:  # D2 names no board: what stood against the first one's SOC was perhaps another's
+                self._alone.pop(bus, None)
+        for held in self._load.judged(board, fields):
             self._contradicts(board, held)
         against = words(fields, "daly.contradicts")
         for name, other in zip(words(fields, "daly.contradiction"), against, strict=False):
+            if name == "soc" and record.time_ns - self._soc_set.get(bus, -_RECENT_NS) < _RECENT_NS:
+                continue  # a host has set it between the two
+            if name == "soc" and (_nothing(fields) or other in self._nothings):
+                continue  # told as a reply of zeros
             held = Held(name, record.number, record.time_ns, other)
+            alone = self._alone.setdefault(bus, [])
+            if name == "soc" and (dialect == "d2" or other in self._d2) and len(alone) < _MOST_ALONE:
+                alone.append((board, held))
+                continue
             # A reply that has the current itself was judged by it.
             if name not in _OF_LOAD or "daly.pack.current" in fields or not self._load.hold(board, held):
                 self._contradicts(board, held)
@@ -107,46 +133,55 @@ class Values(Watch):
 
     def _of_zeros(self, record: Decoded, bus: str, fields: Fields) -> None:
         """Follow replies of nothing but zeros: right for some IDs, but not in a row with one where they can't be."""
-        if fields.get("daly.dialect") != "a5":
-            if fields.get("daly.pack.voltage") == 0 and fields.get("daly.soc") == 0:
-                self._zero[_board(record, bus)].add(record.number, record.time_ns)
-            return
         place = _board(record, bus)
-        run = self._runs[place]
-        data, data_id = str(fields.get("daly.data", "")), fields.get("daly.data_id")
-        numbered = data_id in _NUMBERED and data[2:] == _ZERO[2:]
-        if data != _ZERO and not numbered:
-            run.clear()
-            return
-        if len(run) < _MOST_ZERO and (data != _ZERO or data_id not in _NEVER_ZERO):
-            if run and run[-1] is None:
+        if fields.get("daly.dialect") != "a5":
+            if _nothing(fields):
                 self._zero[place].add(record.number, record.time_ns)
-            else:
-                run.append((record.number, record.time_ns))
             return
-        for earlier in run:
-            if earlier is not None:
+        run = self._runs[place]
+        zero = run.reply(str(fields.get("daly.data", "")), fields.get("daly.data_id"))
+        if zero is None:
+            run.waiting.append((record.number, record.time_ns))
+        elif not zero:
+            self._cleared(place, run.end())
+        else:
+            for earlier in run.waiting:
                 self._zero[place].add(*earlier)
-        run[:] = [None]
-        self._zero[place].add(record.number, record.time_ns)
+            run.waiting.clear()
+            self._zero[place].add(record.number, record.time_ns)
 
     def _fault(self, record: Decoded, bus: str, fields: Fields) -> None:
-        who = bus, fields.get("daly.board"), address_of(fields)
-        if who not in self._told and len(self._told) < 4096:
-            self._told.add(who)
-            for name, value in fields.items():
-                if value is True and name.startswith(_FAULT) and name.removeprefix(_FAULT) not in _STATES:
-                    group = self._faults[_board(record, bus, name.removeprefix(_FAULT))]
-                    group.standing.add(record.number, record.time_ns)
+        place = _board(record, bus)
+        run = self._runs[place]
+        cleared = set(words(fields, "daly.fault_cleared"))
+        if run.running:
+            run.hide(cleared)
+            return
+        if fields.get("daly.dialect") != "a5" and _nothing(fields):
+            run.kept |= cleared
+            return
+        kept, run.kept = run.kept, set[str]()
+        standing = {name.removeprefix(_FAULT) for name in fields if name.startswith(_FAULT) and fields[name] is True}
+        self._cleared(place, cleared | (kept - standing))
+        if not run.told:
+            run.told = True
+            for name in standing - _STATES:
+                self._faults[_board(record, bus, name)].standing.add(record.number, record.time_ns)
+            return
         for name in words(fields, "daly.fault_raised"):
-            if name not in _STATES:
+            if name not in _STATES and name not in kept:
                 self._faults[_board(record, bus, name)].raised.add(record.number, record.time_ns)
-        for name in words(fields, "daly.fault_cleared"):
-            if name not in _STATES:
-                self._faults[_board(record, bus, name)].cleared += 1
+
+    def _cleared(self, place: Place, names: set[str]) -> None:
+        for name in names - _STATES:
+            self._faults[replace(place, detail=name)].cleared += 1
 
     def findings(self) -> Iterator[Finding]:
         """Say what is contradictory, zero, faulty or unknown."""
+        for place, run in list(self._runs.items()):
+            self._cleared(place, run.end())
+        for board, held in (one for alone in self._alone.values() for one in alone):
+            self._contradicts(board, held)
         for board, held in self._load.rest():
             self._contradicts(board, held)
         for place, group in self._contradictions.items():
@@ -171,3 +206,10 @@ class Values(Watch):
 def _board(record: Decoded, bus: str, detail: str = "") -> Place:
     board = number(record.fields, "daly.board")
     return Place(bus, board, None if board is not None else address_of(record.fields), detail=detail)
+
+
+def _nothing(fields: Fields) -> bool:
+    """Tell whether a reply of Modbus says what no battery can: 0 V and 0 %, or a cell of 0 V and a capacity of 0."""
+    return (fields.get("daly.pack.voltage") == 0 and fields.get("daly.soc") == 0) or (
+        fields.get("daly.setting.rated_capacity") == 0 and fields.get("daly.setting.cell_nominal_voltage") == 0
+    )

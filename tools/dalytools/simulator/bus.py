@@ -290,13 +290,14 @@ class Bus:
         for station in self._careless():
             if since_ns <= station.due_ns < reply.time_ns and (said := station.barge_in(self)):
                 name, data, at = said
-                if at + self.wire_ns(data) <= reply.time_ns:
+                place = round((reply.time_ns - at) / self._char_ns)
+                if place >= len(data):
                     sent.append(Sent(at, name, data))  # whole, but the board is busy
                     self._note_unanswered(data, name, at, "busy")
                     return False
-                both = overlaid(data, reply.data, round((reply.time_ns - at) / self._char_ns))
+                both = overlaid(data, reply.data, place)
                 sent.append(Sent(at, f"{name}, {reply.sender}", both))
-                self.truth.note(at, "collision", senders=[name, reply.sender])
+                self.truth.note(at, "collision", senders=[name, reply.sender], heard=both.hex(), harmed=True)
                 return True
         return False
 
@@ -313,16 +314,15 @@ class Bus:
 
     def _mixed(self, piece: Sent) -> list[Sent]:
         """Return what is heard of a piece when stations that do not listen begin to speak during it."""
-        pieces = [piece]
-        end = piece.time_ns + self.wire_ns(piece.data)
         for station in self._careless():
-            if piece.time_ns <= station.due_ns < end and (said := station.barge_in(self)):
+            place = round((station.due_ns - piece.time_ns) / self._char_ns)  # behind the last byte it harms none
+            if station.due_ns >= piece.time_ns and place < len(piece.data) and (said := station.barge_in(self)):
                 name, data, at = said
-                heard = overlaid(piece.data, data, round((at - piece.time_ns) / self._char_ns))
-                pieces = [Sent(piece.time_ns, f"{piece.sender}, {name}", heard)]
-                self.truth.note(at, "collision", senders=[piece.sender, name])
-                return pieces
-        return pieces
+                heard = overlaid(piece.data, data, place)
+                harmed = heard != piece.data  # zeros win: what falls on them alone leaves no trace
+                self.truth.note(at, "collision", senders=[piece.sender, name], heard=heard.hex(), harmed=harmed)
+                return [Sent(piece.time_ns, f"{piece.sender}, {name}", heard) if harmed else piece]
+        return [piece]
 
     # What goes wrong on demand ---------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ One object a happening, in order of time (seconds from the first moment of the b
     echo            a sleeping board gave a request back                address, data_id
     zero_reply      a reply of nothing after waking up                  board, data_id
     damaged         a frame was damaged on the wire                     sender, how, sent, heard
-    collision       two stations spoke at once                          senders
+    collision       two stations spoke at once                          senders, heard, harmed (whether a byte was)
     cut_burst       a board stopped in the middle of a burst            board, data_id, sent, of
     skipped_frame, repeated_frame    in a burst                         board, data_id, frame
     other_board     a board answered what another was asked             board, asked, data_id

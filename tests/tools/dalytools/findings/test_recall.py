@@ -41,10 +41,10 @@ def test_every_kind_of_fault_has_a_rule() -> None:
 
 
 @pytest.mark.parametrize("name", list(ready_made()))
-def test_what_was_injected_is_found_and_no_more(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_injected_is_found_and_no_more(name: str, tmp_path: Path) -> None:
     for wire in wires(name):
         for seed in SEEDS["can" if wire == "can" else "uart"]:
-            judged = judge(scenario(name, seed), tmp_path / f"{wire}{seed}.pcapng", monkeypatch, wire=wire)
+            judged = judge(scenario(name, seed), tmp_path / f"{wire}{seed}.pcapng", wire=wire)
             assert judged.missed == [], (wire, seed)
             assert judged.invented == [], (wire, seed)
             if name.startswith("clean-"):
@@ -54,10 +54,10 @@ def test_what_was_injected_is_found_and_no_more(name: str, tmp_path: Path, monke
 def test_what_is_put_in_is_seen_to_be_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The comparison itself: with one rule's moments taken away, or one note, it says so."""
     made = scenario("faults", 1)
-    whole = judge(made, tmp_path / "whole.pcapng", monkeypatch)
-    assert whole.notes == 4
+    whole = judge(made, tmp_path / "whole.pcapng")
+    assert len(whole.notes) == 4
     monkeypatch.setitem(FOUND_BY, "fault_raised", FOUND_BY["fault_present"])
-    assert len(judge(made, tmp_path / "less.pcapng", monkeypatch).missed) == 4
+    assert len(judge(made, tmp_path / "less.pcapng").missed) == 4
 
 
 SESSIONS: dict[str, list[str]] = {}

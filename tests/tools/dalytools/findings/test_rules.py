@@ -14,6 +14,7 @@ from tests.tools.dalytools.findings.injected import (
     CASES,
     CLEAN,
     EPOCH_NS,
+    FAULTY,
     FINE,
     LATER,
     MOS_OFF,
@@ -439,3 +440,84 @@ def test_samples(name: str) -> None:
     }
     if stem in expected:
         assert {finding.rule for finding in found} == expected[stem]
+
+
+def test_faults_that_zeros_seemed_to_clear_were_there_all_the_time(tmp_path: Path) -> None:
+    """A board that wakes answers 0x98 with zeros as well; then it says again what it said before."""
+    packets = [
+        *asked(0, 0x98, FAULTY),
+        *(heard for at, data_id in enumerate((0x98, 0x90), 2) for heard in asked(at, data_id, a5(1, data_id))),
+        *asked(5, 0x90, PACK),
+        *asked(6, 0x98, FAULTY),
+        *asked(7, 0x98, FINE),
+    ]
+    found = search(capture(tmp_path / "woke.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"zero-reply", "fault-standing"}
+    assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
+
+
+def test_zeros_before_a_silence_are_not_of_the_waking_up_behind_it(tmp_path: Path) -> None:
+    """No cell is balanced: 0x97 is zero and right. Two requests unanswered, and the zeros of a board that woke."""
+    packets = [
+        *asked(-1, 0x98, FINE),
+        *asked(0, 0x90, PACK),
+        *asked(1, 0x97, a5(1, 0x97)),
+        Heard(2, a5(0x40, 0x98)),
+        Heard(4, a5(0x40, 0x98)),
+        *asked(6, 0x98, FINE),
+        *asked(7, 0x90, a5(1, 0x90)),
+        *asked(8, 0x90, PACK),
+    ]
+    zeros = one(search(capture(tmp_path / "slept.pcapng", [*packets, *LATER])), "zero-reply")
+    assert (zeros.tally.count, zeros.tally.first_packet) == (2, 10)
+
+
+def _d2_says(soc: int) -> str:
+    """A read of 0028 to 002A: 19.8 V, 0 A, SOC in 0.1 %."""
+    return brings(198, 30000, soc)
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_d2_names_no_board(others: int, tmp_path: Path) -> None:
+    """SOC 50 % by D2, 38.5 % by board 1: a contradiction if it is the only board; of two, it may be the other's."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        Heard(1, read(0x28, 3)),
+        Heard(1.05, _d2_says(500)),
+        *(asked(5, 0x90, a5(2, 0x90, "00c60000753001f4"), host=0x41) if others else []),
+    ]
+    found = search(capture(tmp_path / "d2.pcapng", [*packets, *LATER]))
+    assert [finding.place.detail for finding in found if finding.rule == "contradiction"] == ["soc"] * (1 - others)
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_soc_that_a_host_sets_in_between_is_no_contradiction(written: bool, tmp_path: Path) -> None:
+    sets = [Heard(2, a5(0x40, 0x21, "00000000000001f4")), Heard(2.05, a5(1, 0x21, "01"))]  # 50 %
+    packets = [
+        Heard(1, read(0x28, 3)),
+        Heard(1.05, _d2_says(385)),
+        *(sets if written else []),
+        *asked(3, 0x90, a5(1, 0x90, "00c60000753001f4")),
+    ]
+    found = search(capture(tmp_path / "soc.pcapng", [*packets, *LATER]))
+    assert ("contradiction" in {finding.rule for finding in found}) is not written
+
+
+def test_a_late_reply_is_not_of_the_wrong_board(tmp_path: Path) -> None:
+    """Board 1 is given up, board 2 is asked the same and still waits: what board 1 says then is its own, late."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        *asked(1, 0x90, a5(2, 0x90, "00c6000075300181"), host=0x41),
+        Heard(5, a5(0x40, 0x90)),
+        Heard(6.5, a5(0x41, 0x90)),
+        Heard(6.6, PACK),
+    ]
+    found = search(capture(tmp_path / "late.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"late", "unanswered"}
+
+
+def test_the_next_current_may_come_long_after(tmp_path: Path) -> None:
+    """Slow polls: 30 s later another load. That it stepped between the two replies can't be ruled out."""
+    packets = [*CLEAN, *asked(5, 0x91, extremes(3400, 2, 3290, 5)), *asked(35, 0x90, a5(1, 0x90, "00c6000077240181"))]
+    found = search(capture(tmp_path / "slow.pcapng", [*packets, Heard(60)]))
+    assert "contradiction" not in {finding.rule for finding in found}
