@@ -174,6 +174,8 @@ def _before(r: random.Random, connection: int) -> Iterator[bytes]:
     else:
         data = r.randbytes(r.randrange(30))
     head = struct.pack("<BH", 0x1B if board else 0x52, CHOSEN) if r.random() < 0.03 else _head(r, board)
+    if r.random() < 0.05:
+        board = 1 - board  # the host is somebody's device itself
     return _value(r, board, connection, head + data)
 
 

@@ -86,6 +86,14 @@ class _Connection:
     """Sides of Daly's attributes that a packet is missing of."""
 
 
+def _speaker(received: int, pdu: bytes) -> Direction:
+    """Return whose value an ATT packet holds; nothing: it holds none, or the host is somebody's device itself."""
+    opcode = pdu[0] if pdu else 0
+    if opcode in _WRITES and received != 1:
+        return "outbound"
+    return "inbound" if opcode in _NOTICES and received != 0 else ""
+
+
 class Bluetooth:
     """Takes the HCI packets of a capture, in order."""
 
@@ -147,20 +155,20 @@ class Bluetooth:
             whole.data += data
         else:
             if whole is not None:
-                self._lose(connection, whole)
+                self._lose(connection, received, whole)
             whole = _Unfinished(data, 4 + int.from_bytes(data[:2], "little"))
         if len(data) < length or len(whole.data) > whole.length:  # cut off by the snap length, or not a part of it
-            self._lose(connection, whole)
+            self._lose(connection, received, whole)
         elif len(whole.data) < whole.length:
             connection.unfinished[received] = whole
         elif int.from_bytes(whole.data[2:4], "little") == _ATT_CHANNEL:
             return self._att(packet, connection, received, whole.data[4:])
         return ()
 
-    def _lose(self, connection: _Connection, part: _Unfinished) -> None:
+    def _lose(self, connection: _Connection, received: int, part: _Unfinished) -> None:
         """Note that a packet stays incomplete: where it is one of Daly's, bytes are missing."""
         if connection.begun and int.from_bytes(part.data[2:4], "little") == _ATT_CHANNEL:
-            direction = self._side(connection, part.data[4:])
+            direction = self._side(connection, received, part.data[4:])
             if direction:
                 connection.lost.add(direction)
 
@@ -170,12 +178,11 @@ class Bluetooth:
             connection.begun = int.from_bytes(pdu[1:3], "little") in self._handles or begins(pdu[3:])
         return connection.begun
 
-    def _side(self, connection: _Connection, pdu: bytes) -> Direction:
+    def _side(self, connection: _Connection, received: int, pdu: bytes) -> Direction:
         """Return which side's value an ATT packet holds, where its attribute may be Daly's; else nothing."""
-        opcode, handle = pdu[0] if pdu else 0, int.from_bytes(pdu[1:3], "little")
-        if len(pdu) < 3 or not (handle in connection.handles or handle in self._handles):
-            return ""
-        return "outbound" if opcode in _WRITES else "inbound" if opcode in _NOTICES else ""
+        handle = int.from_bytes(pdu[1:3], "little")
+        known = len(pdu) >= 3 and (handle in connection.handles or handle in self._handles)
+        return _speaker(received, pdu) if known else ""
 
     def _connection(self, interface: int, adapter: int, handle: int) -> _Connection:
         key = (interface, adapter, handle)
@@ -189,8 +196,8 @@ class Bluetooth:
 
     def _att(self, packet: Packet, connection: _Connection, received: int, pdu: bytes) -> Sequence[Packet]:
         opcode = pdu[0] if pdu else 0
-        if (opcode in _WRITES or opcode in _NOTICES) and len(pdu) > 3:
-            direction = self._side(connection, pdu)
+        if len(pdu) > 3 and _speaker(received, pdu):
+            direction = self._side(connection, received, pdu)
             if direction and self._begins(connection, pdu):
                 self.found = True
                 return (self._value(packet, connection, pdu[3:], direction),)

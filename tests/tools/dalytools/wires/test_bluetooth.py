@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -73,6 +74,26 @@ def test_attributes_are_known_by_their_handles() -> None:
     air.put(RECEIVED, data("1b1200" + ANSWER.hex()))
     assert [number for number, _, _ in air.values("0x0f,17")] == [1, 2, 3, 4]
     assert [number for number, _, _ in air.values("17")] == [2, 4]
+
+
+@pytest.mark.parametrize("link_type", [HCI, HCI_WITH_DIRECTION, LINUX_MONITOR])
+def test_where_the_host_is_somebodys_device_itself_it_is_no_board(link_type: int) -> None:
+    air = Air(link_type)
+    air.put(RECEIVED, connected(), event=True)
+    air.discover()
+    air.put(RECEIVED, data("520f00" + ASK.hex()))
+    air.put(SENT, data("1b1100" + ANSWER.hex()))
+    assert air.values() == air.values("15,17") == []
+    air.speak()
+    assert air.values() == air.values("15,17") == [(6, "outbound", ASK), (7, "inbound", ANSWER)]
+
+
+def test_where_no_direction_is_told_the_opcode_tells_it() -> None:
+    air = Air(HCI)
+    air.discover()
+    air.speak()
+    air.packets = [replace(packet, direction="") for packet in air.packets]
+    assert air.values() == [(3, "outbound", ASK), (4, "inbound", ANSWER)]
 
 
 @pytest.mark.parametrize("enhanced", [False, True])
