@@ -103,6 +103,11 @@ def _open_pyserial(name: str, settings: Settings) -> Port:
         device.rts = device.dtr = settings.modem_lines == "leave"  # pyserial sets them when it opens
         device.open()
     except (serial.SerialException, ValueError, OSError) as error:
+        if "RFC2217" in str(error):  # it listens, and does not answer; pyserial's text has its own objects in it
+            raise PortError(
+                f"{name}: the server does not take speed and format (RFC 2217); if it has them set already, "
+                "use socket://HOST:PORT"
+            ) from None
         raise PortError(f"{name} can not be opened: {str(error).splitlines()[0]}") from None
     ours, theirs = socket.socketpair()
     ours.setblocking(False)

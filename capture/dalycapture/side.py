@@ -264,6 +264,11 @@ class Side:
         self.tally.gap(gap)
         return f"port back after {gap:.3f} s: {'; '.join((port.name, *port.facts.remarks))}"
 
+    def end(self, now: int) -> None:
+        """Note that the capture ends: a port that is still waited for was away until then."""
+        if self.tally.away:
+            self.tally.gap((now - self._lost_ns) / 1e9)
+
     def close(self) -> None:
         """Close the port, or stop waiting for it."""
         self.give_up()

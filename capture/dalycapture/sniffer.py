@@ -141,6 +141,7 @@ class Sniffer:
                 self._count_line_errors(side, now)
                 self._take(side.flush(now))
                 self._tell_trouble(side, now + TICK_NS)
+                side.end(now)
             self._write(self._order.rest())
             self.tally.seconds = (now - self._started_ns) / 1e9
             self._to_all(lambda sink: sink.finish())
@@ -252,7 +253,7 @@ class Sniffer:
 
     def _on_loss(self, side: Side, why: str, now: int) -> None:
         self._take(side.flush(now))
-        self._event(side, now, f"port lost: {why}")
+        self._event(side, now, f"port lost: {why.rpartition('; ')[0]}")  # without what to do about it
         side.lost(now, self._wake_up)
         if side.lost_for_ever:
             self.tally.problem = why

@@ -113,7 +113,11 @@ class SideTally:
                 "counters": None if self.counts is None else self.counts._asdict(),
             },
             "bytes_lost_before_us": self.lost if self.counts else None,
-            "gaps": {"count": self.gaps, "seconds": [round(gap, 3) for gap in self.gaps_s]},
+            "gaps": {
+                "count": self.gaps,
+                "seconds": [round(gap, 3) for gap in self.gaps_s],
+                "away_at_the_end": self.away,
+            },
             "time_bound_ms": {
                 "p50": round(self.bounds.quantile_ms(0.5), 3),
                 "p99": round(self.bounds.quantile_ms(0.99), 3),

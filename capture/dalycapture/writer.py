@@ -149,8 +149,11 @@ class CaptureWriter(ABC):
                 side.dropped = 0
                 if self._statistics_at == math.inf:
                     self._statistics_at = time.monotonic() + STATISTICS_S
-                if not data and self._series:
-                    self._series.sync_soon()
+                if self._series:
+                    if not data:
+                        self._series.sync_soon()
+                    if self._series.last and self._series.is_full(self._in_file):
+                        self.complete = True
                 return
         self.lost += records
         side.lost += records

@@ -211,6 +211,16 @@ def test_urls_that_are_none() -> None:
     assert "can not be opened" in refused("rfc2217://127.0.0.1:1")
 
 
+def test_a_server_that_does_not_speak_rfc2217(bus: Bus) -> None:
+    """A plain TCP server hands bytes on, and answers no negotiation."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        place = f"127.0.0.1:{server.getsockname()[1]}"
+        assert refused(f"rfc2217://{place}?timeout=0.3") == (
+            f"rfc2217://{place}?timeout=0.3: the server does not take speed and format (RFC 2217); if it has them set "
+            "already, use socket://HOST:PORT"
+        )
+
+
 def test_pyserial_is_not_imported_for_a_device(bus: Bus) -> None:
     code = (
         "import sys; from dalycapture.opening import open_port; open_port(sys.argv[1]).close()\n"

@@ -100,6 +100,22 @@ def test_it_waits_so_long_and_no_longer(socket: Socket, tmp_path: Path) -> None:
     assert "did not come back" in sniffer.tally.problem
 
 
+def test_a_port_that_is_away_at_the_end_counts_too(socket: Socket, tmp_path: Path) -> None:
+    path = tmp_path / "x.pcapng"
+    sniffer = Sniffer([side(socket)], [open_writer(path)])
+    with running(sniffer):
+        gone = time.monotonic()
+        socket.unplug()
+        until(lambda: sniffer.tally.sides[0].away)
+        time.sleep(0.3)
+    tally = sniffer.tally.sides[0]
+    assert tally.gaps == 1
+    assert 0.3 <= tally.gaps_s[0] <= time.monotonic() - gone
+    assert tally.as_json()["gaps"]["away_at_the_end"] is True
+    (event,) = read_capture(path)
+    assert event.comment == f"port lost: {socket.name} went away"  # what to do then, the file can't know
+
+
 def test_one_of_two_sides_may_be_away(socket: Socket, tmp_path: Path) -> None:
     path = tmp_path / "x.pcapng"
     with Bus() as other:

@@ -164,6 +164,20 @@ def test_the_end_after_so_many_files(tmp_path: Path) -> None:
     assert len(got) >= 12
 
 
+def test_the_last_of_so_many_files_ends_when_it_is_full(tmp_path: Path) -> None:
+    """As dumpcap's does: it holds no more than the others, and nothing else need be heard for the capture to end."""
+    with Bus() as bus:
+        port = open_port(bus.port)
+        bus.send(b"".join(numbered(n) for n in range(6)))
+        limits = Limits(duration=10)
+        tally = Sniffer([Side(port, tap("x"))], [series(tmp_path, packets=3, stop_after=2)], limits=limits).run()
+        port.close()
+    assert tally.end is End.FILES
+    assert [[p.data for p in read_capture(path)] for path in captures(tmp_path)] == [
+        [numbered(n) for n in group] for group in ([0, 1, 2], [3, 4, 5])
+    ]
+
+
 def test_names_are_told_when_closed(tmp_path: Path) -> None:
     names = tmp_path / "names"
     names.write_text("an older line\n", encoding="utf-8")

@@ -62,7 +62,8 @@ def side_sentences(side: SideTally) -> list[str]:
         said.append(f"Line errors at {side.name}: {marks}; the driver counts {counts or 'none'}.")
     if side.gaps:
         longest = max(side.gaps_s)
-        said.append(f"{side.name} was away {counted(side.gaps, 'time')}, for {longest:.1f} s at most.")
+        back = ", and was not back at the end" if side.away else ""
+        said.append(f"{side.name} was away {counted(side.gaps, 'time')}, for {longest:.1f} s at most{back}.")
     return said
 
 

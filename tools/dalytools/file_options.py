@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from dalycapture.disk import SYNC_S
 from dalycapture.rotation import Keeping, Rotation
+from dalytools.problem import Problem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,11 +48,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def read(args: argparse.Namespace, *, stop_after: int | None = None) -> Keeping:
-    """Return what the command line asks for; stop_after: files."""
+    """Return what the command line asks for; stop_after: files. Raises Problem."""
     rotation = Rotation(stop_after=stop_after)
     conditions: Sequence[tuple[str, float | int | str]] = args.rotation
     for name, value in conditions:
         rotation = replace(rotation, **{name: value})
+    if stop_after is not None and not rotation.asked:
+        raise Problem("-a files:N ends after so many files; say with -b when each next one begins, as -b duration:3600")
     return Keeping(
         append=args.append,
         checksum=args.sha256,

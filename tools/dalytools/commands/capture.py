@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         "While it runs: m or Enter, or the signal SIGUSR2, puts a mark of yours into the file; SIGUSR1 begins the next "
-        "file (with -b). Exit status: 0 fine, 2 could not run, records were lost, or the port went away for good."
+        "file. Exit status: 0 fine, 2 could not run, records were lost, or the port went away for good."
     )
     parser.add_argument("--list", action="store_true", help="list the serial adapters, without opening any, and end")
     parser.add_argument(

@@ -218,6 +218,7 @@ def test_what_can_be_wrong_is_one_line(bus: Bus, tmp_path: Path) -> None:
             ["-b", "pages:3"],
             "'pages:3' is not a condition for a new file; use duration:SECONDS, interval:SECONDS, filesize:KB",
         ),
+        (["-a", "files:2"], "say with -b when each next one begins"),
         (["-b", "files:0"], "'files:0' is not a condition for a new file"),
         (["-b", "duration:nan"], "'duration:nan' is not a condition for a new file"),
         (["--sync", "-1"], "'-1' is not a number of seconds from 0 up"),

@@ -178,4 +178,6 @@ def test_what_was_wrong_is_said() -> None:
     assert "5 times are doubtful" in text
     assert "Line errors at a: 3 bytes and 1 break marked; the driver counts 3 framing errors, 1 breaks." in text
     assert "a was away 1 time, for 2.5 s at most." in text
+    side.away = True
+    assert "a was away 1 time, for 2.5 s at most, and was not back at the end." in " ".join(side_sentences(side))
     assert side_sentences(SideTally("a")) == []
