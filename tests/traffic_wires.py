@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The trouble of tests/traffic.py on other wires (docs/wires.md), packet by packet, as capture files hold it.
 
-    tcp   each packet of a side is a segment; some come again, some change places, some (with losses) never come
+    tcp   each packet of a side is a segment; some come again, in IP fragments, change places, or (with losses) never
     ble   each packet of a side is one or several ATT values, some over several HCI packets; other devices talk as well,
           some of other makers on the same attributes; connections break and begin anew, not always with a frame
     can   classic frames, both directions, HKMS registers, inverters, standard, remote, short and strange ones
@@ -45,6 +45,21 @@ def segment(side: int, connection: int, sequence: int, data: bytes, acknowledged
     return ip + head + data
 
 
+def fragments(r: random.Random, packet: bytes, number: int) -> list[bytes]:
+    """Cut an IPv4 packet into two or three fragments, in any order."""
+    head, rest = packet[:20], packet[20:]
+    cuts = [0, *sorted(r.sample(range(8, len(rest), 8), min(r.choice((1, 2)), (len(rest) - 1) // 8))), len(rest)]
+    made = [
+        head[:2]
+        + struct.pack(">HHH", 20 + b - a, number, a // 8 | (0x2000 if b < len(rest) else 0))
+        + head[8:]
+        + rest[a:b]
+        for a, b in itertools.pairwise(cuts)
+    ]
+    r.shuffle(made)
+    return made
+
+
 def _starts(r: random.Random) -> dict[tuple[int, int], int]:
     """Return where the sequence numbers of each connection and side start: half of them begin anew before long."""
     return {
@@ -57,12 +72,14 @@ def _starts(r: random.Random) -> dict[tuple[int, int], int]:
 def tcp(seed: int, *, lossy: bool = False, again: bool = True) -> Iterator[OnWire]:
     """Yield segments of four connections. lossy: some never come, and none change places; again: some come twice.
 
-    Each acknowledges what came before it: else Wireshark's relative sequence numbers would be those of the wire, and it
-    would lose what spans their wrap (docs/wires.md 4).
+    Some come in IP fragments; of lossy ones, a fragment may never come. Each acknowledges what came before it: else
+    Wireshark's relative sequence numbers would be those of the wire, and it would lose what spans their wrap
+    (docs/wires.md 4).
     """
     r = random.Random(seed)
     following = _starts(r)
     came = dict(following)
+    number = 0
     kept: tuple[tuple[int, int], int, bytes] | None = None
     for made in Traffic(seed).packets():
         if not made.data:
@@ -82,7 +99,15 @@ def tcp(seed: int, *, lossy: bool = False, again: bool = True) -> Iterator[OnWir
             kept = (key, following[key], packet)
             continue
         came[key] = following[key]
-        yield OnWire(made.time_ns, packet)
+        if r.random() < 0.02:
+            number = (number + 1) & 0xFFFF
+            pieces = fragments(r, packet, number)
+            if lossy and r.random() < 0.2:
+                del pieces[-1]
+            for piece in pieces:
+                yield OnWire(made.time_ns, piece)
+        else:
+            yield OnWire(made.time_ns, packet)
         if again and luck > 0.98:
             yield OnWire(made.time_ns + 1000, packet)
         if kept is not None:

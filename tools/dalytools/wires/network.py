@@ -11,10 +11,12 @@ What can't hold one of the ports is passed over before scapy looks at it, for sc
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from dalytools.extra import missing
+from dalytools.wires.fragments import Fragments, may_be_fragment
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,6 +28,7 @@ LINK_TYPES: Final = frozenset((0, 1, 12, 14, 101, 113, 228, 229, 276))
 
 SYN, RST, ACK = 0x02, 0x04, 0x10
 
+_RAW_IP: Final = 101
 _MOST_SOUGHT: Final = 64  # ports worth a search of the packet's bytes
 
 
@@ -54,13 +57,22 @@ class Network:
         sought = ports.each() if len(ports) <= _MOST_SOUGHT else []
         words = b"|".join(re.escape(port.to_bytes(2, "big")) for port in sought)
         self._sought = re.compile(words, re.DOTALL)
+        self._fragments = Fragments()
 
-    def segment(self, link_type: int, data: bytes) -> Segment | None:
-        """Return the segment in a packet; None where there is none of ours, or a part of one (IP fragments)."""
-        if not self._sought.search(data):
+    def segment(self, link_type: int, data: bytes, time_ns: int) -> Segment | None:
+        """Return the segment in a packet; None where there is none of ours, or fragments of it are missing."""
+        suspect = may_be_fragment(data)
+        if not suspect and not self._sought.search(data):
             return None
         layers = self._layers
-        found = layers.of[link_type](data)
+        try:
+            found = layers.of[link_type](data)
+        except (struct.error, IndexError, ValueError):  # the lowest header is cut off
+            return None
+        if suspect:
+            found = self._unfragmented(found, time_ns)
+            if found is None:
+                return None
         tcp = found.getlayer(layers.tcp)
         if tcp is None or not (tcp.sport in self._ports or tcp.dport in self._ports):
             return None
@@ -78,6 +90,18 @@ class Network:
             there,
             max(0, length - len(tcp.original)) if length else 0,
         )
+
+    def _unfragmented(self, found: Any, time_ns: int) -> Any:
+        """Return a packet's layers; of fragments those of the packet that they make, None while some are missing."""
+        layers = self._layers
+        ip = found
+        while ip is not None and not isinstance(ip, (layers.ip, layers.ipv6)):
+            ip = ip.payload or None
+        if ip is None or not ip.original:
+            return found
+        there: bytes = ip.original
+        whole = self._fragments.whole(there, time_ns)
+        return found if whole is there else whole and layers.of[_RAW_IP](whole)
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,7 +122,7 @@ class Tcp:
     def feed(self, packet: Packet) -> list[Packet]:
         """Take a packet; return what has come to be in order: of the gap that it closes, or given up, by its own."""
         out = self.pass_time(packet.time_ns)
-        segment = self._network.segment(packet.link_type, packet.data)
+        segment = self._network.segment(packet.link_type, packet.data, packet.time_ns)
         if segment is not None:
             connection, which = self._connection(segment, out)
             self.latest = connection.name

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from scapy.layers.inet import IP, TCP, fragment
+from scapy.layers.inet import ICMP, IP, TCP
 from scapy.layers.inet6 import IPv6, IPv6ExtHdrDestOpt
 from scapy.layers.l2 import CookedLinux, CookedLinuxV2, Dot1Q, Ether, Loopback
 from scapy.packet import Packet as Layers
@@ -237,9 +237,8 @@ def test_the_layers_below(way: str) -> None:
 
 def test_other_traffic_is_left_alone() -> None:
     other = bytes(V4 / TCP(sport=8898, dport=50000, flags="PA") / Raw(ASK + (8899).to_bytes(2, "big")))
-    pieces = [bytes(piece) for piece in fragment(V4 / tcp(SERVER, 1, bytes(64)), 40)]
-    assert len(pieces) == 3
-    assert handed([packet(number, data) for number, data in enumerate([other, *pieces, b""], 1)]) == []
+    refused = bytes(IP(src="192.0.2.1", dst="192.0.2.20") / ICMP(type=3, code=4)) + bytes(V4 / SEGMENT)  # quotes ours
+    assert handed([packet(number, data) for number, data in enumerate([other, refused, b""], 1)]) == []
     assert Carriers().reads(RAW_IP) is False
     assert Carriers().of(packet(1, ip(SERVER, 1, ASK))) == ()
 
