@@ -159,6 +159,10 @@ _WORDS: Final[tuple[tuple[str, Mapping[int, str]], ...]] = (
     ("charger load", {0: "disconnected", 1: "connected"}),
     ("setting.battery_type", {0: "LFP", 1: "ternary", 2: "LTO"}),
     ("setting.operating_mode", {1: "long press", 2: "short press"}),
+    (
+        "setting.inverter",
+        dict(enumerate(("none", "Pylon", "Growatt", "Sofar", "Voltronic", "GoodWe", "SRNE", "MUST", "Victron"))),
+    ),
     ("setting.inverter_bus", {0: "RS485", 1: "CAN"}),
 )
 _SEVERAL: Final = _words(

@@ -69,6 +69,8 @@ def test_names_carry_the_unit() -> None:
 def test_words_stand_for_numbers_and_a_number_without_a_word_stays() -> None:
     state = BY_FIELD["daly.state"]
     assert [state.values(sent) for sent in (0, 1, 2, 7)] == ["stationary", "charging", "discharging", "7"]
+    inverter = BY_FIELD["daly.setting.inverter"]  # field notes, a.2: 0x69
+    assert [inverter.values(sent) for sent in (0, 1, 4, 8, 9)] == ["none", "Pylon", "Voltronic", "Victron", "9"]
 
 
 def test_no_sensor_is_no_temperature() -> None:
