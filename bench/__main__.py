@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from bench.table import Result
 
-NAMES = ("dissector", "wires", "reference", "bulk", "sniffer", "evidence", "replug", "files", "recall")
+NAMES = ("dissector", "wires", "reference", "bulk", "commands", "sniffer", "evidence", "replug", "files", "recall")
 
 
 def _positive(text: str) -> int:
