@@ -68,7 +68,7 @@ add("start",          "start",            hex(ProtoField.uint8, "Start flag", "A
 add("address",        "address",          hex(ProtoField.uint8, "Address",    "Request: who asks, 40 PC, 80 Bluetooth app, 20 GPRS, 41..4F PC to board 2..16; reply: board number; V1.2 2.2, field notes fact 3"))
 add("data_id",        "data_id",          hex(ProtoField.uint8, "Data ID",    "What is asked or answered; V1.2 section 3", data_ids))
 add("unknown_id",     "unknown_id",       boolean("Unknown data ID", "The data ID stands in no paper and no field note: its bytes are shown as they are; generated (docs/protocol.md)"))
-add("length",         "length",           plain(ProtoField.uint8, "Data length", "Bytes of data, always 8; V1.2 2.3"))
+add("length",         "length",           hex(ProtoField.uint8, "Data length", "Bytes of data, always 8; V1.2 2.3"))
 add("data",           "data",             bytes("Data",          "The eight data bytes; V1.2 2.3"))
 add("checksum",       "checksum",         hex(ProtoField.uint8, "Checksum",   "Low byte of the sum of all bytes before; V1.2 2.3 note 2"))
 add("checksum_status", "checksum.status", named("Checksum status", CHECKSUM,  "0 Bad, 1 Good, 2 Unverified; generated"))

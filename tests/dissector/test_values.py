@@ -86,3 +86,10 @@ def test_writes_stand_out(sessions: dict[str, list[Row]]) -> None:
         "WRITE board 1  0x21 Set Clock, SOC: sets clock to 2022-12-13 21:29:39, SOC to 30.0 %  [unanswered]"
     )
     assert info(sessions["what no table names"][0]) == "Reply board 1  0xAB unknown ID  01 00 00 00 00 00 00 00"
+
+
+def test_bytes_of_the_head_are_hex(dissect: Dissect) -> None:
+    """As the paper writes them (V1.2 2.3), and as they can be typed into a filter."""
+    (row,) = dissect([P(a5(0x40, 0x90), 0)])
+    head = ("start", "address", "data_id", "length", "checksum")
+    assert [row[f"daly.{name}"] for name in head] == [["0xa5"], ["0x40"], ["0x90"], ["0x08"], ["0x7d"]]
