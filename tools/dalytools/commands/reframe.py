@@ -84,6 +84,8 @@ def _feed(reframer: Reframer, args: argparse.Namespace) -> str:
                 packet = next(packets, None)
             except CaptureError as error:  # of the input: the output's are raised below
                 if not reframer.result.packets and not reframer.result.others:
+                    if str(error).endswith("give a pcapng or pcap file"):
+                        raise CaptureError(f"{error}, or --raw where it is the bytes of a port") from None
                     raise
                 return f"{error}; what came before is in the output"
             if packet is None:

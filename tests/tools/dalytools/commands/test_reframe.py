@@ -41,12 +41,14 @@ def test_a_damaged_one_gives_what_it_has(tmp_path: Path, capsys: pytest.CaptureF
         (["missing", "-w", "OUT"], "missing: there is no such file"),
         (["SAME", "-w", "TEXT"], "is not a capture file, so it is not overwritten"),
         (["TEXT", "-w", "OUT"], "is a text file, not a capture"),
+        (["BYTES", "-w", "OUT"], "give a pcapng or pcap file, or --raw where it is the bytes of a port"),
         (["-", "--raw", "-w", "OUT"], "--raw needs a file"),
     ],
 )
 def test_what_can_not_be(words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "TEXT").write_text("three years of work", encoding="utf-8")
     (tmp_path / "SAME").write_bytes(CHUNKED.read_bytes())
+    (tmp_path / "BYTES").write_bytes(bytes(range(0xA5)))
     paths = [str(tmp_path / word) if word.isupper() else word for word in words]
     assert main(["reframe", *paths]) == 2
     assert said in capsys.readouterr().err
