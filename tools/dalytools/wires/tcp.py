@@ -34,7 +34,7 @@ _SPACE: Final = 1 << 32
 _NEVER: Final = 1 << 63
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Piece:
     """Bytes of a segment, and the packet it came in. Places are sequence numbers that do not begin anew."""
 
@@ -43,6 +43,8 @@ class _Piece:
     end: int
     """Behind the data, or behind what the capture cut off of it."""
     packet: Packet
+    received_ns: int | None = None
+    """When it was known that the other side has all before it."""
 
     def part(self, start: int, end: int) -> _Piece:
         return _Piece(start, self.data[start - self.start : end - self.start], end, self.packet)
@@ -67,8 +69,6 @@ class _Side:
     held: int = 0
     waits_from_ns: int = 0
     """When the first of those that wait came."""
-    received_ns: int | None = None
-    """When it was known that the other side has what is missing here."""
     skipped: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     """Places of bytes that were given up: from, to."""
 
@@ -79,8 +79,8 @@ class _Side:
     @property
     def deadline_ns(self) -> int:
         """When what waits is handed over without what is missing before it."""
-        longest = self.waits_from_ns + LONGEST_WAIT_NS
-        return longest if self.received_ns is None else min(longest, self.received_ns + RECEIVED_WAIT_NS)
+        longest, received_ns = self.waits_from_ns + LONGEST_WAIT_NS, self.waiting[0].received_ns
+        return longest if received_ns is None else min(longest, received_ns + RECEIVED_WAIT_NS)
 
 
 @dataclass(slots=True)
@@ -190,10 +190,15 @@ class Tcp:
                 self._note(connection, which)
 
     def _received(self, side: _Side, packet: Packet) -> None:
-        """Note when it is known that the other side has what is missing before those that wait."""
-        known = side.acknowledged
-        if side.received_ns is None and known is not None and side.place(known) >= side.waiting[0].start:
-            side.received_ns = packet.time_ns
+        """Note of those that wait when it is known that the other side has what is missing before them."""
+        if side.acknowledged is None:
+            return
+        known = side.place(side.acknowledged)
+        for one in side.waiting:
+            if one.start > known:
+                return
+            if one.received_ns is None:
+                one.received_ns = packet.time_ns
 
     def _take(self, connection: Connection, which: int, segment: Segment, packet: Packet, out: list[Packet]) -> None:
         side = connection.sides[which]
@@ -259,7 +264,6 @@ class Tcp:
         waiting = side.waiting
         if not waiting:
             side.waits_from_ns = one.packet.time_ns
-            side.received_ns = None
         if not waiting or one.start >= waiting[-1].end:
             waiting.append(one)
             side.held += len(one.data)
@@ -319,11 +323,8 @@ class Tcp:
                 hand()
                 self._miss(side, one.end)
         hand()
-        side.received_ns = None
         if side.waiting:
             side.waits_from_ns = min(one.packet.time_ns for one in side.waiting)
-            latest = max((one.packet for one in side.waiting), key=lambda packet: packet.number)
-            self._received(side, latest if packet is None else packet)
 
     def _handed(self, connection: Connection, which: int, data: bytes, by: Packet, *, after_gap: bool) -> Packet:
         direction: Direction = "inbound" if which else "outbound"

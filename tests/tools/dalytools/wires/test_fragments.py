@@ -182,7 +182,7 @@ def test_wireshark_puts_the_same_together(version: int, kept: list[int], frames:
     path.chmod(0o644)
     with Tshark() as tshark:
         found = compare(tshark, path, wires=CHOICE)
-    assert (found.differences, found.left_out, found.broken) == ([], 0, "")
+    assert (found.differences, found.left_out, found.broken) == ([], [], "")
     assert found.kinds["frame"] == frames
 
 
