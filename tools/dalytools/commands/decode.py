@@ -82,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
     plan = export.read(args)
     span = time_range.read(args)
     problems: list[str] = []
-    columns = bulk_choice.chosen(plan, span, files)
-    if columns is not None and (status := _in_bulk(files, output, columns, plan, options)) is not None:
+    columns = bulk_choice.chosen(plan, files)
+    if columns is not None and (status := _in_bulk(files, output, columns, plan, options, span=span)) is not None:
         return status
     with _opened(plan, output, options, several=len(files) > 1) as out:
         shown = 0
@@ -98,7 +98,9 @@ def run(args: argparse.Namespace) -> int:
     return 2 if problems else 0
 
 
-def _in_bulk(files: list[str], output: str, columns: list[Column], plan: Plan, options: Options) -> int | None:
+def _in_bulk(
+    files: list[str], output: str, columns: list[Column], plan: Plan, options: Options, *, span: TimeRange
+) -> int | None:
     """Write the table the quick way; return the exit status, or None where the plain way must do it."""
     from dalytools.bulk.read import read
     from dalytools.bulk.unlike import OtherMediumError
@@ -118,7 +120,7 @@ def _in_bulk(files: list[str], output: str, columns: list[Column], plan: Plan, o
             table = ParquetFile(raw, everything)
             try:
                 for name in files:
-                    rows = Rows(plain(name), columns, schema)
+                    rows = Rows(plain(name), columns, schema, span)
                     said = shown
                     with progress_bar(f"decode {plain(Path(name).name)}") as advance:
                         try:

@@ -58,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
             (str(finding.severity), finding.rule, f"{where}{finding.place}: {finding.text}. {finding.advice}")
             for finding in search.findings()
         ]
+    if len(problems) == len(files) == 1 and not collected.records:
+        raise Problem(problems[0])
     for problem in problems:
         print(f"dalyshark report: {plain(problem)}", file=sys.stderr)  # noqa: T201
     if not collected.records:

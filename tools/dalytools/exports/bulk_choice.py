@@ -14,17 +14,16 @@ if TYPE_CHECKING:
 
     from dalytools.exports.export import Plan
     from dalytools.exports.schema import Column
-    from dalytools.time_range import TimeRange
 
 _LISTS: Final = frozenset(("daly.cell.voltage", "daly.temperature", "daly.cells.voltage", "daly.sensors.temperature"))
 _OF_THE_RECORD: Final = ("daly.direction", "daly.board", "daly.modbus.", "daly.can.")
 
 
-def chosen(plan: Plan, span: TimeRange, files: Sequence[str]) -> list[Column] | None:
+def chosen(plan: Plan, files: Sequence[str]) -> list[Column] | None:
     """Return the columns that are asked for, where the quick way gives the same rows; else None."""
     if plan.format != "parquet" or plan.rows != "record" or plan.fields is None or plan.partition:
         return None
-    if "-" in files or (span.begin_ns, span.end_ns) != (None, None) or importlib.util.find_spec("numpy") is None:
+    if "-" in files or importlib.util.find_spec("numpy") is None:
         return None
     from dalytools.bulk.left_out import LEFT_OUT
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dalytools.bulk.columns import Column as Told
     from dalytools.bulk.lots import Batch
     from dalytools.exports.schema import Column
+    from dalytools.time_range import TimeRange
 
 _pa: Any = pa  # its stubs want the types of what numpy's arrays hold
 
@@ -31,25 +32,35 @@ class _Piece(NamedTuple):
     interface: Ints
     values: Any
 
+    def some(self, which: Any) -> _Piece:
+        """Return those of them."""
+        heads = (self.row[which], self.number[which], self.time_ns[which], self.interface[which])
+        return _Piece(self.column, *heads, self.values.filter(_pa.array(which)))
+
 
 class Rows:
     """Makes tables of rows from the batches of one file. A row is held while more may be told of its record."""
 
-    def __init__(self, file: str, columns: Sequence[Column], schema: pa.Schema) -> None:
-        """Begin a file. schema: of file, number, time, interface and the columns."""
+    def __init__(self, file: str, columns: Sequence[Column], schema: pa.Schema, span: TimeRange) -> None:
+        """Begin a file. schema: of file, number, time, interface and the columns; span: of the records wanted."""
         self._file = file
+        self._span = span
         self._columns = columns
         self._schema = schema
         self._held: list[_Piece] = []
 
     def take(self, batch: Batch) -> pa.Table | None:
         """Take the next batch; return the rows that are complete."""
-        self._held += self._pieces(batch)
+        self._held += (self._wanted(piece) for piece in self._pieces(batch))
         return self._complete(batch.open_from)
 
     def finish(self) -> pa.Table | None:
         """Return the rows that were held."""
         return self._complete(None)
+
+    def _wanted(self, piece: _Piece) -> _Piece:
+        which = inside(self._span, piece.time_ns)
+        return piece if which.all() else piece.some(which)
 
     def _pieces(self, batch: Batch) -> Iterator[_Piece]:
         tables = [one for one in (*batch.replies.values(), *batch.writes.values(), batch.cells, batch.sensors) if one]
@@ -84,8 +95,7 @@ class Rows:
                 ready.append(piece)
                 continue
             for which, to in ((now, ready), (~now, held)):
-                heads = (piece.row[which], piece.number[which], piece.time_ns[which], piece.interface[which])
-                to.append(_Piece(piece.column, *heads, piece.values.filter(_pa.array(which))))
+                to.append(piece.some(which))
         self._held = [piece for piece in held if len(piece.row)]
         if not sum(len(piece.row) for piece in ready):
             return None
@@ -112,6 +122,16 @@ class Rows:
             where[places] = np.arange(len(places))
             arrays.append(values.take(_pa.array(where, mask=where < 0)))
         return pa.Table.from_arrays(arrays, schema=self._schema)
+
+
+def inside(span: TimeRange, time_ns: Ints) -> Any:
+    """Tell which times (ns since 1970 UTC) are in it."""
+    which = np.ones(len(time_ns), np.bool_)
+    if span.begin_ns is not None:
+        which &= time_ns >= span.begin_ns
+    if span.end_ns is not None:
+        which &= time_ns < span.end_ns
+    return which
 
 
 def _values(column: Column, told: Told) -> tuple[Any, Any]:

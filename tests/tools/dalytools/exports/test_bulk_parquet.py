@@ -32,11 +32,16 @@ def nothing(*_: object) -> None:
 
 
 def both_ways(
-    files: list[Path], fields: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    files: list[Path],
+    fields: str,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    *span: str,
 ) -> int:
     """Write both, hold them against each other; return the rows."""
     quick, slow = folder / "quick.parquet", folder / "plain.parquet"
-    words = ("--format", "parquet", "--fields", fields, "-o")
+    words = (*span, "--format", "parquet", "--fields", fields, "-o")
     used: list[object] = []
     with monkeypatch.context() as patch:
         take = bulk_parquet.Rows.take
@@ -70,6 +75,25 @@ def test_same_rows(
     cut = tmp_path / "cut.pcapng"
     cut.write_bytes(made[1].read_bytes()[:-7])
     assert both_ways([*files, cut], fields, tmp_path, monkeypatch, capsys) > 100
+
+
+def test_a_range_of_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Cells whose burst began before it are in the table of a record in it."""
+    path = tmp_path / "bus.pcapng"
+    write(path, itertools.islice(likely_bus(3), 1500))
+    whole = both_ways([path], ASKED[0], tmp_path, monkeypatch, capsys)
+    times = pq.read_table(tmp_path / "quick.parquet").column("time_UTC").to_pylist()
+    first, last = (f"{times[place].timestamp():.6f}" for place in (whole // 3, 2 * whole // 3))
+    for span, rows in (
+        (("-A", first), whole - whole // 3),
+        (("-B", last), 2 * whole // 3),
+        (("-A", first, "-B", last), 2 * whole // 3 - whole // 3),
+        (("-A", "1"), whole),
+    ):
+        assert both_ways([path], ASKED[0], tmp_path, monkeypatch, capsys, *span) == rows
+    cut = tmp_path / "cut.pcapng"
+    cut.write_bytes(path.read_bytes()[:-7])
+    assert both_ways([path, cut], ASKED[0], tmp_path, monkeypatch, capsys, "-B", first) == 2 * (whole // 3)
 
 
 def test_what_the_quick_way_does_not_have_goes_the_plain_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
