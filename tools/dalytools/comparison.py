@@ -370,7 +370,7 @@ def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[in
     """Go through both readings together, packet by packet."""
     ready, expected = fed.ready, fed.expected
     sides: dict[Key, tuple[_Rest, _Rest]] = {}
-    last_seen = 0
+    last_seen = held = 0
     for row in rows:
         values = _values(row)
         number = int(values[0])
@@ -378,8 +378,10 @@ def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[in
         mine: list[Decoded] = []
         while ready and ready[0].number <= number:
             record = ready.popleft()
-            if not record.held:  # what TCP holds to the end, Wireshark shows as a TCP segment
+            if not record.held:
                 mine.append(record)
+            elif number not in fed.passed_over:  # what TCP holds to the end, Wireshark shows as a TCP segment
+                held += 1
         result.packets += 1
         result.records += len(mine)
         while expected and expected[0] <= number:
@@ -405,6 +407,8 @@ def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[in
         )
     for rest in sides.values():
         _close(last_seen, rest, result)
+    if held:
+        result.left_out.append(LeftOut("tcp_records", held))
 
 
 def _close(number: int, rest: tuple[_Rest, _Rest], result: Comparison) -> None:

@@ -106,6 +106,8 @@ class Bluetooth:
         """A value of Daly's was seen."""
         self.others: set[int] = set()
         """Some handles of attributes that carry values which are not known as Daly's."""
+        self.incomplete = 0
+        """Packets of Daly's attributes that stayed incomplete."""
         self.before = 0
         """Values of attributes with Daly's UUIDs that came before one of Daly's, and are left out."""
 
@@ -170,6 +172,7 @@ class Bluetooth:
         if connection.begun and int.from_bytes(part.data[2:4], "little") == _ATT_CHANNEL:
             direction = self._side(connection, received, part.data[4:])
             if direction:
+                self.incomplete += 1
                 connection.lost.add(direction)
 
     def _begins(self, connection: _Connection, pdu: bytes) -> bool:

@@ -87,8 +87,9 @@ class Carriers:
     @property
     def left_out(self) -> list[LeftOut]:
         """Tell what was found so far and left out, beside what `nothing` says."""
-        before = self._bluetooth.before
-        return [LeftOut("ble_values", before)] if before and not self.nothing else []
+        before = 0 if self.nothing else self._bluetooth.before
+        counts = (LeftOut("ble_values", before), LeftOut("ble_packets", self._bluetooth.incomplete))
+        return [one for one in counts if one.count]
 
     def of(self, packet: Packet) -> Sequence[Packet]:
         """Return what has come for the decoder: of this packet, and of those that waited for it; often nothing."""

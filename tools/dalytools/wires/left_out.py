@@ -12,13 +12,18 @@ from dalytools.terminal_text import counted, plain
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-What = Literal["tcp_connections", "ble_values"]
+What = Literal["tcp_connections", "tcp_records", "ble_values", "ble_packets"]
 
 _WORDS: dict[What, tuple[str, str]] = {
     "tcp_connections": (
         "TCP connection",
         "not compared: where a capture has lost segments, Wireshark can't show well those that came late or twice",
     ),
+    "tcp_records": (
+        "incomplete TCP record",
+        "not compared: its end is lost or not in the capture, and Wireshark shows a TCP segment",
+    ),
+    "ble_packets": ("Bluetooth packet", "left out: a piece of it is missing, or was cut off by the snap length"),
     "ble_values": (
         "Bluetooth value",
         (

@@ -14,6 +14,7 @@ from tests.tools.dalytools.wires.air import RECEIVED, SENT, Air, connected, data
 from dalyref.decoder import decode
 from dalytools.cli import main
 from dalytools.wires.carriers import Carriers
+from dalytools.wires.left_out import LeftOut
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -137,6 +138,21 @@ def test_what_is_lost_before_divides_nothing() -> None:
     made.put(RECEIVED, data("1b1100" + ANSWER[:6].hex(), whole=16))
     speak(made, (RECEIVED, ANSWER))
     assert [(one.number, one.after_gap) for one in carried(made)] == [(5, False), (6, False), (8, True)]
+
+
+def test_incomplete_packets_are_counted_from_the_beginning_on() -> None:
+    made = air()
+    lost = data("1b1100" + ANSWER[:6].hex(), whole=16)
+    made.put(RECEIVED, lost)
+    speak(made, (RECEIVED, ANSWER))
+    made.put(RECEIVED, lost)
+    made.put(RECEIVED, lost)
+    speak(made, (RECEIVED, ANSWER))
+    carriers = Carriers()
+    for packet in made.packets:
+        carriers.of(packet)
+    assert carriers.left_out == [LeftOut("ble_packets", 2)]
+    assert str(carriers.left_out[0]).startswith("2 Bluetooth packets left out: ")
 
 
 def test_a_value_without_bytes_begins_nothing() -> None:
