@@ -25,6 +25,7 @@ if set_plugin_info then
 end
 
 local field_module = require("daly_fields")
+local getters = require("daly_getters")
 local windows = require("daly_windows")
 local view = require("daly_view")
 local serial = require("daly_serial")
@@ -129,14 +130,15 @@ end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
 
+local ports_of, brought_by = getters.attribute("Pinfo", "port_type"), getters.attribute("Pinfo", "match_uint")
 local handle
 
 function daly.dissector(buffer, pinfo, parent)
   handle = handle or Dissector.get("daly")
-  local ports = pinfo.port_type
+  local ports = ports_of(pinfo)
   if ports ~= NO_PORTS then
     return (ports == ble.PORT_TYPE and ble or tcp).dissect(buffer, pinfo, parent, handle)
-  elseif can.brought(buffer, pinfo.match_uint) then
+  elseif can.brought(buffer, brought_by(pinfo)) then
     return can.dissect(buffer, pinfo, parent, handle)
   end
   return serial.dissect(buffer, pinfo, parent, handle)

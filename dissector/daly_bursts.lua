@@ -32,13 +32,13 @@ M.IDS = IDS
 -- Values in one frame.
 local PER_FRAME = { [0x95] = 3, [0x96] = 7 }
 
--- What a frame is shown by whose burst has a known count, { base =, count = }: one for all such bursts.
+-- What a frame is shown by whose burst has a known count, { base =, count =, shared = true }: one for all such bursts.
 local shapes = { [0] = {}, [1] = {} }
 
 local function shape_of(base, count)
   local shape = shapes[base][count]
   if not shape then
-    shape = { base = base, count = count }
+    shape = { base = base, count = count, shared = true }
     shapes[base][count] = shape
   end
   return shape

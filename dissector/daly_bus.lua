@@ -89,14 +89,12 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
     link[slot], wait[slot], memory[slot] = request or false, waited or false, false
   elseif BURST_IDS[id] then
-    link[slot], wait[slot], memory[slot] = false, false, false
     local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends)
     link[slot], wait[slot], memory[slot] = request or false, waited or false, shown or false
     if values then
       boards.feed_table(bus, slot, number, values, address, id, starts, ends)
     end
   else
-    link[slot], wait[slot], memory[slot] = false, false, false
     if state.burst then
       bursts.finish(bus)
     end

@@ -11,6 +11,7 @@
 
 local can_bus = require("daly_can_bus")
 local classic = require("daly_can_classic")
+local getters = require("daly_getters")
 local hkms = require("daly_hkms")
 local ids = require("daly_can_ids")
 local second_look = require("daly_second_look")
@@ -21,6 +22,12 @@ local M = {}
 
 -- Called by its name, a method of Wireshark's objects is looked up in C every time.
 local bytes_of, place_of, length_of = Tvb.raw, Tvb.offset, Tvb.reported_len
+local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
+local time_of, brought_by = getters.attribute("Pinfo", "rel_ts"), getters.attribute("Pinfo", "match_uint")
+local value_of = getters.attribute("FieldInfo", "value")
+local extract = getters.operator("Field", "__call", function(field)
+  return field()
+end)
 local out = view.out
 
 -- State of the capture that is open.
@@ -98,9 +105,9 @@ local function interface_key(tree)
   if no_interfaces then
     return NO_INTERFACE
   end
-  local id = interface_id()
+  local id = extract(interface_id)
   no_interfaces = tree and not id -- a classic pcap
-  return id and id.value or NO_INTERFACE
+  return id and value_of(id) or NO_INTERFACE
 end
 
 -- The frame at hand, for view.one.
@@ -186,7 +193,7 @@ end
 
 --- Dissect a CAN frame. `handle`: our protocol's dissector. Returns how many bytes were taken, 0: it is not ours.
 function M.dissect(buffer, pinfo, parent, handle)
-  local id, number = pinfo.match_uint, pinfo.number
+  local id, number = brought_by(pinfo), number_of(pinfo)
   local slot, first = slot_of(buffer, number)
   if id == CHOSEN then
     if chosen then
@@ -211,8 +218,8 @@ function M.dissect(buffer, pinfo, parent, handle)
   end
   local from, whole = state, true
   -- Every frame but those of CAN FD has this flag, where there is a tree.
-  local flag = is_remote()
-  local remote = flag and flag.value
+  local flag = extract(is_remote)
+  local remote = flag and value_of(flag)
   local seen = flag or can_id()
   -- Without a tree it was taken for a data frame.
   local not_ours = seen and not flag or remote and id < ids.STANDARD
@@ -220,11 +227,11 @@ function M.dissect(buffer, pinfo, parent, handle)
   if remote then
     data = ""
   end
-  if first and not pinfo.visited then
+  if first and not is_again(pinfo) then
     if not_ours then
       return 0
     end
-    can_bus.read(state, interface_key(seen), slot, number, id, data, pinfo.rel_ts)
+    can_bus.read(state, interface_key(seen), slot, number, id, data, time_of(pinfo))
     if not seen then
       note_blind(number)
     end

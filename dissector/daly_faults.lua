@@ -61,7 +61,7 @@ M.BITS = {
   { 6, 5, "charging_cabinet_offline",     "Charging cabinet offline (a state)", state = true },     -- reserved
 }
 
-local byte, floor = string.byte, math.floor
+local byte, sub, floor = string.byte, string.sub, math.floor
 
 local POWER = { [0] = 1, 2, 4, 8, 16, 32, 64, 128 }
 
@@ -70,9 +70,20 @@ function M.is_set(data, at, bit)
   return floor(byte(data, at + bit[1]) / POWER[bit[2]]) % 2 == 1
 end
 
+-- The bytes of the table, and what they are of a board in good health: most are, and need no look at each bit.
+local BYTES = 7
+local NONE = ("\0"):rep(BYTES)
+
+local function bytes_of(data, at)
+  return sub(data, at, at + BYTES - 1)
+end
+
 --- What is set in data: list of the bits' names, how many are failures, whether one is of level 2.
 function M.read(data, at)
   local names, count, severe = {}, 0, false
+  if bytes_of(data, at) == NONE then
+    return names, count, severe
+  end
   for i = 1, #M.BITS do
     local bit = M.BITS[i]
     if M.is_set(data, at, bit) then
@@ -89,6 +100,9 @@ end
 --- Names of the bits that came and that went between two strings of data.
 function M.changes(before, before_at, data, at)
   local raised, cleared = {}, {}
+  if bytes_of(before, before_at) == bytes_of(data, at) then
+    return raised, cleared
+  end
   for i = 1, #M.BITS do
     local bit = M.BITS[i]
     local was, is = M.is_set(before, before_at, bit), M.is_set(data, at, bit)

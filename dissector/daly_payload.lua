@@ -241,11 +241,16 @@ local function statistics(values, one_absent, other_absent)
   return lowest, low_at, highest, high_at, count > 0 and sum / count
 end
 
+local cell_fields = {}
+for i = 1, 48 do
+  cell_fields[i] = fields["cell." .. i]
+end
+
 --- The table of all cells (mV).
 function M.show_cells(cells, out)
   local lowest, low_at, highest, high_at, average = statistics(cells)
   for i = 1, #cells do
-    out.made_cell(fields.cells_voltage, fields["cell." .. i], cells[i], i == low_at, i == high_at)
+    out.made_cell(fields.cells_voltage, cell_fields[i], cells[i], i == low_at, i == high_at)
   end
   out.made(fields.cells_count, #cells)
   out.made(fields.cells_min, lowest, " mV")
@@ -368,7 +373,7 @@ show[0x97] = function(frame, out)
   out.little(fields.balance_mask, 0, 6)
   for i = 0, 5 do
     local bits = byte(frame.raw, 5 + i)
-    for k = 0, 7 do
+    for k = 0, bits > 0 and 7 or -1 do
       if floor(bits / 2 ^ k) % 2 == 1 then
         out.value(fields.balance_cell, i, 1, 8 * i + k + 1)
       end
@@ -397,12 +402,17 @@ words[0x97] = function(frame)
   return "cells " .. concat(list, " ") .. (active ~= 0 and format("  (active balancer: cell %d)", active) or "")
 end
 
+local fault_fields = {}
+for i = 1, #faults.BITS do
+  fault_fields[i] = fields["fault." .. faults.BITS[i][3]]
+end
+
 -- 0x98: bits.7 code.1
 show[0x98] = function(frame, out, from)
   local raw = frame.raw
   for i = 1, #faults.BITS do
     local bit = faults.BITS[i]
-    out.value(fields["fault." .. bit[3]], bit[1], 1, faults.is_set(raw, 5, bit))
+    out.value(fault_fields[i], bit[1], 1, byte(raw, 5 + bit[1]) ~= 0 and faults.is_set(raw, 5, bit))
   end
   out.bytes(fields.fault_code, 7, 1)
   local _, count = faults.read(raw, 5)

@@ -5,6 +5,7 @@
 --
 --   packet --interface, direction--> stream (daly_streams) --> records --> daly_view
 
+local getters = require("daly_getters")
 local streams = require("daly_streams")
 local records = require("daly_records")
 local second_look = require("daly_second_look")
@@ -14,6 +15,13 @@ local windows = require("daly_windows")
 local M = {}
 
 local bytes_of = Tvb.raw
+local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
+local time_of, side_of = getters.attribute("Pinfo", "rel_ts"), getters.attribute("Pinfo", "p2p_dir")
+local brought_by = getters.attribute("Pinfo", "match_uint")
+local value_of = getters.attribute("FieldInfo", "value")
+local extract = getters.operator("Field", "__call", function(field)
+  return field()
+end)
 
 -- State of the capture that is open.
 local options
@@ -56,8 +64,8 @@ end
 
 -- The interface of the packet at hand, in this list of those known; the number -1 stands for one that can't be told.
 local function interface_of(known)
-  local id = interface_id()
-  local key = id and id.value or -1
+  local id = extract(interface_id)
+  local key = id and value_of(id) or -1
   local interface = known[key]
   if not interface then
     local info = interface_description()
@@ -76,11 +84,11 @@ end
 
 -- Direction of the packet at hand: -1 not known, 0 sent, 1 received; and whether it takes a tree to know it.
 local function direction_of(pinfo)
-  if pinfo.match_uint == CHOSEN and has_rtac then
+  if brought_by(pinfo) == CHOSEN and has_rtac then
     local event = rtac_event()
     return event and RTAC_DIRECTION[event.value] or -1, event == nil
   end
-  return pinfo.p2p_dir, false
+  return side_of(pinfo), false
 end
 
 local function stream_of(from, interface, direction)
@@ -94,7 +102,7 @@ local function stream_of(from, interface, direction)
 end
 
 local function read_again(state, interface, direction, number, pinfo, raw)
-  streams.first(state, stream_of(state, interface, direction), number, pinfo.rel_ts, raw)
+  streams.first(state, stream_of(state, interface, direction), number, time_of(pinfo), raw)
 end
 
 -- What to show a packet from that was read without its interface: the capture, and whether its end is known.
@@ -141,15 +149,15 @@ end
 function M.dissect(buffer, pinfo, parent, handle)
   local raw = bytes_of(buffer)
   local length = #raw
-  local number = pinfo.number
-  local again = number <= read_to or pinfo.visited
+  local number = number_of(pinfo)
+  local again = number <= read_to or is_again(pinfo)
   local from = capture
   local whole
   if not again then
     read_to = number
     local interface = interface_of(interfaces)
     local direction, unseen = direction_of(pinfo)
-    whole = streams.first(capture, stream_of(capture, interface, direction), number, pinfo.rel_ts, raw)
+    whole = streams.first(capture, stream_of(capture, interface, direction), number, time_of(pinfo), raw)
     if interface.key == -1 then
       blind = blind or second_look.new(streams.capture(options))
       blind.interfaces = blind.interfaces or {}

@@ -21,6 +21,7 @@ local results_module = require("daly_results")
 local M = {}
 
 local byte, find, sub = string.byte, string.find, string.sub
+local feed_bus = bus_module.feed
 
 -- Bytes that make a good A5 frame less than clear, where they stand inside it: the start of another; a Modbus function,
 -- with an address before it.
@@ -63,18 +64,55 @@ local function is_clear(raw, b, c, e, f, g, h, i, j, k, l, sum)
   return true
 end
 
--- Whether a packet is one Modbus frame of a board and nothing else: no other frame begins in it and ends before it.
+-- Packets that were found to be one frame, good and clear: most come again, byte for byte. Not more than so many.
+local MOST_CLEAR = 4096
+local clear, clear_count = {}, 0
+
+local function keep_clear(raw)
+  if clear_count >= MOST_CLEAR then
+    clear, clear_count = {}, 0
+  end
+  clear[raw], clear_count = true, clear_count + 1
+end
+
+-- Whether 13 bytes are a good A5 frame that holds no beginning of another.
+local function is_clear_frame(raw)
+  if clear[raw] then
+    return true
+  end
+  local a, b, c, d, e, f, g, h, i, j, k, l, sum = byte(raw, 1, 13)
+  if
+    a ~= 0xA5
+    or d ~= 8
+    or (a + b + c + d + e + f + g + h + i + j + k + l) % 256 ~= sum
+    or not is_clear(raw, b, c, e, f, g, h, i, j, k, l, sum)
+  then
+    return false
+  end
+  keep_clear(raw)
+  return true
+end
+
+-- The same of a Modbus frame of a board.
 local function is_one_modbus(raw, length)
+  if clear[raw] then
+    return true
+  end
   local first, fn = byte(raw, 1, 2)
   if first == INNER_A5 or not MODBUS_FUNCTIONS[fn] or windows.window(raw, 1, length) ~= length then
     return false
   end
-  return not find(raw, "\xA5..\8", 2) and not find(raw, INNER_MODBUS, 2) and not records.is_modules(raw, 1)
+  if find(raw, "\xA5..\8", 2) or find(raw, INNER_MODBUS, 2) or records.is_modules(raw, 1) then
+    return false
+  end
+  keep_clear(raw)
+  return true
 end
 
 --- Everything known of one capture. `options`: baud; quiet, echo, reply, late, slow, burst, age in seconds; tolerances:
 -- cell_tolerance (mV), temperature_tolerance (C), sum_tolerance, soc_tolerance (%).
 function M.capture(options)
+  clear, clear_count = {}, 0 -- what is a frame depends on the preferences
   return {
     options = options,
     byte_time = 10 / options.baud,
@@ -365,21 +403,8 @@ function M.first(capture, stream, number, time, raw)
   end
   local ends = time + length * byte_time
   stream.ended = ends
-  if length == 13 and cutter.buf == "" then
-    local a, b, c, d, e, f, g, h, i, j, k, l, sum = byte(raw, 1, 13)
-    if
-      a == 0xA5
-      and d == 8
-      and (a + b + c + d + e + f + g + h + i + j + k + l) % 256 == sum
-      and is_clear(raw, b, c, e, f, g, h, i, j, k, l, sum)
-    then
-      bus_module.feed(stream.bus, number, number, raw, time, ends, stream.side, stream)
-      cutter.base = cutter.base + 13
-      return true
-    end
-  end
-  if cutter.buf == "" and is_one_modbus(raw, length) then
-    bus_module.feed(stream.bus, number, number, raw, time, ends, stream.side, stream)
+  if cutter.buf == "" and (length == 13 and is_clear_frame(raw) or is_one_modbus(raw, length)) then
+    feed_bus(stream.bus, number, number, raw, time, ends, stream.side, stream)
     cutter.base = cutter.base + length
     return true
   end

@@ -8,6 +8,7 @@ local payload = require("daly_payload")
 local bursts = require("daly_bursts")
 local exchange = require("daly_exchange")
 local addresses = require("daly_addresses")
+local getters = require("daly_getters")
 local data_ids = require("daly_data_ids")
 local foreign = require("daly_foreign")
 local mbrtu = require("daly_mbrtu")
@@ -25,6 +26,10 @@ local byte, format, concat = string.byte, string.format, table.concat
 local add, add_le, referenced = TreeItem.add, TreeItem.add_le, TreeItem.referenced
 local append_text, set_text, set_generated = TreeItem.append_text, TreeItem.set_text, TreeItem.set_generated
 local range = Tvb.range
+local columns_of, is_visible = getters.attribute("Pinfo", "cols"), getters.attribute("TreeItem", "visible")
+local set_column = getters.operator("Columns", "__newindex", function(columns, name, text)
+  columns[name] = text
+end)
 
 local packet_comment = Field.new("frame.comment")
 
@@ -53,7 +58,7 @@ end
 -- capture was read to its end; `medium`: uart where it is nil.
 function M.look(parent, handle, known, read, medium)
   wanted = referenced(parent, handle)
-  visible = wanted and parent.visible
+  visible = wanted and is_visible(parent)
   results, again, transport = known, read, medium or "uart"
 end
 
@@ -61,6 +66,10 @@ end
 
 -- The record at hand: its item of the tree, and where its bytes stand.
 local tree, tvb, at
+
+-- The range of bytes that was made last for a value, and where it lies: bits of one byte share it, for each object of
+-- Wireshark's costs as much again when Lua collects it.
+local range_at, range_length, last_range
 
 local out = {}
 
@@ -75,7 +84,12 @@ end
 
 function out.value(field, first, length, value, unit)
   if visible or referenced(tree, field) then
-    local item = add(tree, field, range(tvb, at + 4 + first, length), value)
+    local place = at + 4 + first
+    if place ~= range_at or length ~= range_length then
+      last_range = range(tvb, place, length)
+      range_at, range_length = place, length
+    end
+    local item = add(tree, field, last_range, value)
     if visible and unit then
       append_text(item, unit)
     end
@@ -153,16 +167,28 @@ end
 
 local made = out.made
 
+local dialect, start, source_address, data_id = fields.dialect, fields.start, fields.address, fields.data_id
+local data_length, data, checksum, checksum_status = fields.length, fields.data, fields.checksum, fields.checksum_status
+
 -- Head and tail of 13 bytes A5 . . 08: what a damaged frame shows too.
 local function show_frame(status)
-  made(fields.dialect, "a5")
-  header(fields.start, 0, 1)
-  header(fields.address, 1, 1)
-  header(fields.data_id, 2, 1)
-  header(fields.length, 3, 1)
-  header(fields.data, 4, 8)
-  header(fields.checksum, 12, 1)
-  made(fields.checksum_status, status)
+  made(dialect, "a5")
+  if visible then -- all of them, and no question asked of each
+    add(tree, start, range(tvb, at, 1))
+    add(tree, source_address, range(tvb, at + 1, 1))
+    add(tree, data_id, range(tvb, at + 2, 1))
+    add(tree, data_length, range(tvb, at + 3, 1))
+    add(tree, data, range(tvb, at + 4, 8))
+    add(tree, checksum, range(tvb, at + 12, 1))
+  else
+    header(start, 0, 1)
+    header(source_address, 1, 1)
+    header(data_id, 2, 1)
+    header(data_length, 3, 1)
+    header(data, 4, 8)
+    header(checksum, 12, 1)
+  end
+  made(checksum_status, status)
 end
 
 -- Columns -----------------------------------------------------------------------------------------
@@ -284,6 +310,32 @@ local function show_odd(odd)
   end
 end
 
+-- Words of replies, by their bytes, and what they were made with: a reply comes again and again. Not more than so many;
+-- those of another carrier apart, for they begin otherwise.
+local MOST_TOLD = 4096
+local told, told_with, told_count
+
+local function forget_told()
+  told, told_with, told_count = {}, {}, 0
+end
+forget_told()
+
+-- A reply's words, where the same was told before, else nil; and whether its words may be kept. `memory`: a value, or a
+-- table that never changes.
+local function told_before(raw, memory)
+  if carrier or type(memory) == "table" and not memory.shared then
+    return nil, false
+  end
+  return told_with[raw] == memory and told[raw], true
+end
+
+local function keep_told(raw, memory, text)
+  if told_count >= MOST_TOLD then
+    forget_told()
+  end
+  told[raw], told_with[raw], told_count = text, memory, told_count + 1
+end
+
 -- A request (echo, retry): expert notes and fields of its own; returns its words.
 local function request(item, raw, slot, id, flag, text)
   local unanswered
@@ -335,9 +387,61 @@ local function show_place(slot)
   end
 end
 
+-- A reply: expert notes and fields; returns its words, which begin with `text`.
+local function reply(item, raw, slot, id, length, odd, text)
+  local memory = results.memory[slot]
+  frame.raw, frame.memory, frame.table, frame.text = raw, memory, nil, nil
+  local whole = length == 8 -- else it says nothing
+  local numbered = whole and bursts.IDS[id]
+  if numbered then
+    frame.table, frame.text = payload.whole(slot, memory, again)
+  end
+  local before, lasting = told_before(raw, memory)
+  if before then
+    text = before
+  else
+    local words = whole and payload.words[id]
+    text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
+    if lasting then
+      keep_told(raw, memory, text)
+    end
+  end
+  if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
+    local complaints = payload.complaints(id, frame)
+    for i = 1, #complaints do
+      item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
+    end
+  end
+  local wait = results.wait[slot]
+  if wait and wait >= 0 then
+    if wait > slow then
+      item:add_proto_expert_info(experts.slow, format("The reply came %.3f s after the request", wait))
+    end
+    if wanted then
+      made(fields.response_time, wait, " s")
+    end
+  end
+  local cut_off = numbered and again and bursts.is_cut_off(results, slot)
+  if cut_off then
+    item:add_proto_expert_info(experts.cut_off)
+  end
+  if wanted then
+    if numbered then
+      show_place(slot)
+      if cut_off then
+        made(fields.cut_off, true)
+      end
+    end
+    if whole and payload.show[id] then
+      payload.show[id](frame, out, odd and odd.from)
+    end
+  end
+  return text
+end
+
 -- An A5 frame: fields, expert notes; returns words, source, destination. What it means does not depend on its carrier.
 local function a5(item, raw, slot)
-  local address, id, length = byte(raw, 2, 4)
+  local _, address, id, length = byte(raw, 1, 4)
   local flag, odd = results.flag[slot], results.odd[slot]
   local text, source, destination
   if carrier then
@@ -345,8 +449,7 @@ local function a5(item, raw, slot)
   else
     text, source, destination = names_of(address, id)
   end
-  local reply = address < 0x20
-  local wait = results.wait[slot]
+  local answers = address < 0x20
   if wanted then
     local board
     if carrier then
@@ -356,7 +459,7 @@ local function a5(item, raw, slot)
       show_frame(1)
       board = board_of(address)
     end
-    made(fields.direction, reply and 2 or flag == "echo" and 3 or 1)
+    made(fields.direction, answers and 2 or flag == "echo" and 3 or 1)
     if board then
       made(fields.board, board)
     end
@@ -365,48 +468,11 @@ local function a5(item, raw, slot)
     end
     local link = results.link[slot]
     if link then
-      made(reply and fields.request_in or fields.reply_in, link)
+      made(answers and fields.request_in or fields.reply_in, link)
     end
   end
-  if reply then
-    local memory = results.memory[slot]
-    frame.raw, frame.memory, frame.table, frame.text = raw, memory, nil, nil
-    local whole = length == 8 -- else it says nothing
-    local numbered = whole and bursts.IDS[id]
-    if numbered then
-      frame.table, frame.text = payload.whole(slot, memory, again)
-    end
-    local words = whole and payload.words[id]
-    text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
-    if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
-      local complaints = payload.complaints(id, frame)
-      for i = 1, #complaints do
-        item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
-      end
-    end
-    if wait and wait >= 0 then
-      if wait > slow then
-        item:add_proto_expert_info(experts.slow, format("The reply came %.3f s after the request", wait))
-      end
-      if wanted then
-        made(fields.response_time, wait, " s")
-      end
-    end
-    local cut_off = numbered and again and bursts.is_cut_off(results, slot)
-    if cut_off then
-      item:add_proto_expert_info(experts.cut_off)
-    end
-    if wanted then
-      if numbered then
-        show_place(slot)
-        if cut_off then
-          made(fields.cut_off, true)
-        end
-      end
-      if whole and payload.show[id] then
-        payload.show[id](frame, out, odd and odd.from)
-      end
-    end
+  if answers then
+    text = reply(item, raw, slot, id, length, odd, text)
   else
     frame.table = nil
     if flag or again or exchange.is_write(id) then
@@ -488,7 +554,7 @@ end
 
 -- Make an item of the tree for a record. `raw`: its bytes; they stand in buffer at offset.
 local function begin(parent, buffer, offset, length, kind)
-  tvb, at = buffer, offset
+  tvb, at, range_at = buffer, offset, nil
   -- Where nobody asks for our fields, nobody sees which bytes the item stands for.
   tree = wanted and length > 0 and add(parent, daly, range(buffer, offset, length)) or add(parent, daly)
   if wanted then
@@ -537,7 +603,7 @@ end
 -- Bytes that begin a record of a later packet.
 local function one_part(parent, buffer, item)
   local node = parent:add(daly, buffer(item.at, item.length))
-  tree, tvb, at = node, buffer, item.at
+  tree, tvb, at, range_at = node, buffer, item.at, nil
   if wanted then
     made(fields.continued_in, item.part)
   end
@@ -545,6 +611,17 @@ local function one_part(parent, buffer, item)
     node:append_text(format(", %d bytes of a record that ends in packet %d", item.length, item.part))
   end
   return format("%d bytes, continued in #%d", item.length, item.part)
+end
+
+-- The columns, of a packet that is one record.
+local function set_columns(pinfo, text, source, destination)
+  local columns = columns_of(pinfo)
+  set_column(columns, "protocol", "Daly")
+  set_column(columns, "info", text)
+  if source then
+    set_column(columns, "src", source)
+    set_column(columns, "dst", destination)
+  end
 end
 
 -- Info column: all records of a packet, within reason.
@@ -589,13 +666,7 @@ function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing)
   at = -4
   frame.table = nil
   local text, source, destination = show(node, thing, wanted)
-  local cols = pinfo.cols
-  cols.protocol = "Daly"
-  cols.info = text
-  if source then
-    cols.src = source
-    cols.dst = destination
-  end
+  set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
   end
@@ -624,11 +695,7 @@ function M.whole(parent, buffer, raw, slot, pinfo)
   else
     text, source, destination = modbus(node, raw, slot)
   end
-  local cols = pinfo.cols
-  cols.protocol = "Daly"
-  cols.info = text
-  cols.src = source
-  cols.dst = destination
+  set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
   end
