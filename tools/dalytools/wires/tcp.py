@@ -295,7 +295,8 @@ class Tcp:
         """Note that bytes are lost, up to a place."""
         side.lost = self.lost = True
         if until is not None:
-            side.skipped.append((side.next, until))
+            start = side.skipped.pop()[0] if side.skipped and side.skipped[-1][1] == side.next else side.next
+            side.skipped.append((start, until))
             del side.skipped[:-_MOST_SKIPPED]
             side.next = until
 

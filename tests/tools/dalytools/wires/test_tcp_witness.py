@@ -160,7 +160,7 @@ def by_stream(rows: list[Row]) -> dict[tuple[str, str], list[tuple[int, str, boo
     return streams
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", [*range(100), 477])
 def test_both_hand_over_the_same(seed: int) -> None:
     r = random.Random(seed)
     packets, _ = capture(r, r.choice((0.1, 0.4, 0.8)))
