@@ -45,7 +45,13 @@ class Load:
         self._held: dict[Board, list[Held]] = {}
 
     def judged(self, board: Board, fields: Fields) -> list[Held]:
-        """Take a reply of a board; return contradictions before it that no step of the load explains."""
+        """Take a reply of a board; return contradictions before it that no step of the load explains.
+
+        One of nothing but zeros, as from a board that just woke, says nothing of the load.
+        """
+        data = fields.get("daly.data")
+        if isinstance(data, str) and not data.strip("0"):
+            return []
         if board not in self._known and len(self._known) >= _MOST_BOARDS:
             return []
         known = self._known.setdefault(board, _Known())

@@ -234,7 +234,7 @@ class Bus:
                 self.truth.note(self.now_ns, "echo", **_about(request), address=request[1])
             elif zero:
                 self.truth.note(self.now_ns, "zero_reply", board=number, **_about(request))
-            elif stranger:
+            if stranger and not asleep:  # of zeros or not
                 self.truth.note(self.now_ns, "other_board", board=number, asked=request[1] - 0x3F, **_about(request))
             harm = next((event for event in tricks if event.what == "damage"), None)
             whole, some = self._speak(name, frames, sent, harm, silent_from_ns=quiet_from)

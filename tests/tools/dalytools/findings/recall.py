@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from unittest import mock
 
 from tests.tools.dalytools.findings.injected import search
-from tests.tools.dalytools.findings.visible import Frame, frames, hidden
+from tests.tools.dalytools.findings.visible import Frame, explained, frames, hidden
 
 from dalytools.findings.finding import Finding, Severity, Tally
 from dalytools.simulator.capture_file import write_capture
@@ -93,7 +93,8 @@ CAUSES = {
     "other-dialect": ("unanswered",),
     "unasked": ("late", "damaged", "collision", "other_board"),
     "late": ("late", "other_board"),
-    "wrong-board": ("other_board",),
+    # Behind the answer to another host's newer request, a late reply goes to one that names another board.
+    "wrong-board": ("other_board", "late"),
     "echo": ("echo",),
     "zero-reply": ("zero_reply", "collision"),
     "burst-missing": ("skipped_frame", "damaged", "collision"),
@@ -182,6 +183,9 @@ def judge(
         if moment.severity > Severity.NOTE
         and moment.rule not in of_it
         and not _caused(moment, everything)
+        and not explained(
+            moment.rule, moment.place.board, moment.seconds, heard, everything, LONG_AGO_S.get(moment.rule, AGO_S)
+        )
         and not (moment.rule == "contradiction" and _load_unknown(moment, heard, phase))
     ]
     return out

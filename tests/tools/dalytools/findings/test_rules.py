@@ -235,6 +235,20 @@ def test_another_state_explains_a_contradiction(state: int, count: int, tmp_path
     assert sum(finding.tally.count for finding in found if finding.rule == "contradiction") == count
 
 
+def test_replies_of_zeros_are_no_other_load(tmp_path: Path) -> None:
+    """Behind the contradiction the board wakes up: raw 0 is -3000 A by the letter. The next one is 0 A still."""
+    packets = [
+        *asked(0, 0x93, a5(1, 0x93, "010101")),
+        *CLEAN,
+        *asked(5, 0x91, extremes(3400, 2, 3290, 5)),
+        *asked(6, 0x93, a5(1, 0x93)),
+        *asked(7, 0x90, a5(1, 0x90)),
+        *asked(8, 0x90, PACK),
+    ]
+    found = search(capture(tmp_path / "woke.pcapng", [*sorted(packets, key=lambda heard: heard.at), *LATER]))
+    assert one(found, "contradiction").tally.count == 1
+
+
 def test_replies_of_zeros_in_a_row_are_counted_with_the_one_that_can_not_be(tmp_path: Path) -> None:
     """0x98 of zeros is no fault, and 0x92 may be; beside a 0x91 of zeros they are of a board that just woke."""
     zeros = [

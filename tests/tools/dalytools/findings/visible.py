@@ -25,6 +25,17 @@ ECHO_S = 0.05
 """Who gives a request back does it so soon; no board answers, and no host asks again (field notes b)."""
 SOCKETCAN = 227
 NO_BOARD = (0x80, 0x20)
+FIRST_REQUEST = 0x20
+D2 = 0xD2
+BURSTS = frozenset((0x95, 0x96, 0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
+BURST_QUIET_S = 0.5135
+RECENT_S = 10.0
+"""How old the other side of a contradiction, and a request with a late reply, may be (docs/records.md 7, 11)."""
+TABLE_OF = {0x90: 0x95, 0x91: 0x95, 0x92: 0x96}
+"""What a reply is held against (docs/records.md 11)."""
+SLOTS = {0x95: 3, 0x96: 7}
+STEP_RAW = 10
+"""1 A."""
 IN_SAME_GAP_S = 0.6
 CAPACITY = 0x80
 """First of the settings of D2."""
@@ -40,6 +51,8 @@ class Frame(NamedTuple):
     address: int = -1
     data_id: int = -1
     payload: bytes = b""
+    first: int = -1
+    """The first byte of what is no good A5 frame."""
 
     @property
     def good(self) -> bool:
@@ -61,7 +74,7 @@ def frames(path: Path, start_ns: int) -> list[Frame]:
         elif len(data) == 13 and data[0] == 0xA5 and sum(data[:12]) & 0xFF == data[12]:
             out.append(Frame(seconds, 13, data[1], data[2], data[4:12]))
         elif data:
-            out.append(Frame(seconds, len(data)))
+            out.append(Frame(seconds, len(data), first=data[0]))
     return out
 
 
@@ -70,6 +83,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
     for what, told, why in (
         ("unanswered", _is_error_frame, "its request is an error frame on CAN"),
         ("unanswered", _answered_otherwise, "another reply of this ID answers it (records.md 7)"),
+        ("unanswered", _exception_fits, "an exception of D2 fits each request that waits (wires.md 1)"),
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
@@ -79,6 +93,10 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("cut_burst", _in_damage, "what came of it was damaged"),
         ("other_board", _in_damage, "what came of it was damaged"),
         ("zero_reply", _may_be_zero, "registers that may all be zero"),
+        ("repeated_frame", _cancelled, "a frame left out and sent twice at once comes once"),
+        ("skipped_frame", _cancelled, "a frame left out and sent twice at once comes once"),
+        ("late", _taken_before, "another reply was taken for it: a request is given one late reply (records.md 7)"),
+        ("contradiction", _no_table, "no whole table of its board to hold it against (records.md 11)"),
         ("contradiction", _load_stepped, "the load stepped next to it, which explains a voltage"),
     ):
         if note["what"] == what and told(note, heard, notes):
@@ -97,18 +115,49 @@ def _is_error_frame(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
 
 
 def _answered_otherwise(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    """Tell whether a reply of the ID comes that no newer request takes."""
-    address = int(str(note["address"]))
-    board = None if address in NO_BOARD else address - 0x3F
+    """Tell whether a reply of the ID comes that no newer request takes: each newer one takes a burst, and no more."""
+    asked = int(str(note["address"]))
     at = _at(note)
+    newer: list[int] = []
+    last_at = {asked: at}
+    burst: Frame | None = None
     for frame in _between(heard, at + 1e-3, at + WAITS_S):
-        echo = frame.address == address and frame.seconds < at + ECHO_S
-        if frame.data_id == note.get("data_id") and not echo:
-            if frame.address in {address, *NO_BOARD}:
-                return False
-            if frame.address < 0x20 and board in {None, frame.address}:
+        if frame.data_id != note.get("data_id"):
+            burst = None if 0 <= frame.address < FIRST_REQUEST else burst
+        elif frame.address < FIRST_REQUEST:
+            goes_on, burst = burst is not None and _goes_on(burst, frame), frame
+            takers = [index for index, address in enumerate(newer) if _takes(address, frame.address)]
+            if goes_on:
+                continue
+            if not takers and _takes(asked, frame.address):
                 return True
+            if takers:
+                del newer[takers[-1]]
+        elif frame.seconds > last_at.get(frame.address, -1.0) + ECHO_S:
+            newer.append(frame.address)
+            last_at[frame.address] = frame.seconds
     return False
+
+
+def _exception_fits(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    at = _at(note)
+    of_d2 = any(frame.first == D2 for frame in _between(heard, at - 1e-6, at + 1e-6))
+    return of_d2 and any(other["what"] == "modbus_exception" and 0 < _at(other) - at < WAITS_S for other in notes)
+
+
+def _takes(asked: int, replies: int) -> bool:
+    """Tell whether a request to that address takes a reply of that one: 41..4F are for one board (records.md 7)."""
+    return asked - 0x3F == replies or not 0x41 <= asked <= 0x4F
+
+
+def _goes_on(before: Frame, frame: Frame) -> bool:
+    """Tell whether two replies of an ID are of one burst (records.md 8); the same number twice may be two bursts."""
+    return (
+        frame.data_id in BURSTS
+        and frame.address == before.address
+        and frame.seconds - before.seconds < BURST_QUIET_S
+        and frame.payload[0] > before.payload[0]
+    )
 
 
 def _answers_another(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
@@ -118,9 +167,13 @@ def _answers_another(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
 
 
 def _good_by_accident(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    return all(frame.good for frame in _there(note, heard))
+
+
+def _there(note: Note, heard: list[Frame]) -> list[Frame]:
+    """Return the packets at the time of a note."""
     at = _at(note)
-    near = [frame for frame in _between(heard, at - LONGEST_S, at + 1e-3) if frame.seconds + frame.size / 960 > at]
-    return all(frame.good for frame in near)
+    return [frame for frame in _between(heard, at - LONGEST_S, at + 1e-3) if frame.seconds + frame.size / 960 > at]
 
 
 def _in_damage(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
@@ -136,16 +189,118 @@ def _may_be_zero(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     return "register" in note and int(str(note["register"])) > LAST_MEASURED and note["register"] != CAPACITY
 
 
+def _cancelled(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether the frame was both left out and doubled, and comes once."""
+    other = {"repeated_frame": "skipped_frame", "skipped_frame": "repeated_frame"}[str(note["what"])]
+    same = ("time", "board", "data_id", "frame")
+    both = any(one["what"] == other and all(one[key] == note[key] for key in same) for one in notes)
+    burst = [
+        frame
+        for frame in _between(heard, _at(note) - 1e-3, _at(note) + BURST_QUIET_S)
+        if (frame.address, frame.data_id) == (note["board"], note["data_id"]) and frame.payload[0] == note["frame"]
+    ]
+    return both and len(burst) == 1
+
+
+def _taken_before(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    return any(
+        other["what"] == "other_board"
+        and (other["board"], other["data_id"]) == (note["board"], note.get("data_id"))
+        and 0 < _at(note) - _at(other) < RECENT_S
+        for other in notes
+    )
+
+
+def _no_table(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether neither the newest table before it nor the first one behind it is near, whole and not of zeros.
+
+    One behind another reply of its ID is held against that.
+    """
+    data_id, at = int(str(note["data_id"])), _at(note)
+    if data_id not in TABLE_OF or note["name"] in {"cell_number", "sensor_number"}:
+        return False
+    mine = [frame for frame in heard if frame.address == note["board"]]
+    tables = _tables(mine, TABLE_OF[data_id])
+    before = [table for table in tables if table[0] < at]
+    behind = [table for table in tables if table[0] >= at]
+    again = min((frame.seconds for frame in mine if frame.data_id == data_id and frame.seconds >= at), default=1e9)
+    near_before = bool(before) and at - before[-1][0] < RECENT_S and before[-1][1]
+    near_behind = bool(behind) and behind[0][0] - at < RECENT_S and behind[0][0] < again and behind[0][1]
+    return not near_before and not near_behind
+
+
+def _tables(mine: list[Frame], data_id: int) -> list[tuple[float, bool]]:
+    """Return when one board's tables were whole, and whether anything but zeros was in them."""
+    out: list[tuple[float, bool]] = []
+    count = following = 0
+    some = False
+    before: Frame | None = None
+    for frame in mine:
+        if frame.data_id == 0x94:
+            count = frame.payload[0 if data_id == 0x95 else 1] or count
+        if frame.data_id == data_id:
+            number = frame.payload[0]
+            if before is not None and _goes_on(before, frame):
+                following += 1 if following and number == before.payload[0] + 1 else -following
+                some = some or any(frame.payload[1:7])
+            else:
+                following, some = int(number <= 1), any(frame.payload[1:7])
+            if count and following == -(-count // SLOTS[data_id]):
+                out.append((frame.seconds, some))
+        before = frame
+    return out
+
+
+def explained(rule: str, board: int | None, seconds: float, heard: list[Frame], notes: list[Note], ago: float) -> bool:
+    """Tell whether the bytes can't but say what was found, though nothing of the kind was put in."""
+    if rule == "echo":
+        return any(
+            note["what"] == "unanswered" and note.get("why") == "busy" and _same_request(note, seconds, heard)
+            for note in notes[bisect_left(notes, seconds - 1e-3, key=_at) : bisect_left(notes, seconds + 1e-3, key=_at)]
+        )
+    if rule == "modbus-ambiguous":
+        return any(
+            note["what"] == "unanswered" and "register" in note and _exception_fits(note, heard, notes)
+            for note in notes[bisect_left(notes, seconds - WAITS_S, key=_at) : bisect_left(notes, seconds, key=_at)]
+        )
+    accidents = (
+        frame
+        for note in notes[bisect_left(notes, seconds - ago, key=_at) : bisect_left(notes, seconds + 1e-3, key=_at)]
+        if note["what"] in {"damaged", "collision"} and note.get("harmed") is not False
+        for frame in _there(note, heard)
+        if frame.good
+    )
+    return any(rule != "contradiction" or _still_held(frame, board, seconds, heard) for frame in accidents)
+
+
+def _still_held(accident: Frame, board: int | None, seconds: float, heard: list[Frame]) -> bool:
+    """Tell whether what came by accident is that board's newest reply of its ID (and number) at that time."""
+    what = accident.address, accident.data_id, accident.payload[0] if accident.data_id in BURSTS else 0
+    return accident.address == board and not any(
+        (frame.address, frame.data_id, frame.payload[0] if frame.data_id in BURSTS else 0) == what
+        for frame in _between(heard, accident.seconds + 1e-6, seconds)
+        if frame.good
+    )
+
+
+def _same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
+    """Tell whether a second host with the same address asked the same within 100 ms: an echo (records.md 6)."""
+    near = _between(heard, seconds - 0.114, seconds + 1e-6)
+    return sum((frame.address, frame.data_id) == (note["address"], note["data_id"]) for frame in near) > 1
+
+
 def _load_stepped(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     if note["name"] not in {"pack_voltage", "cell_max", "cell_min"}:
         return False
-    near = _between(heard, _at(note) - 10, _at(note) + 10)
-    currents = [
-        int.from_bytes(frame.payload[4:6])
-        for frame in near
-        if frame.address == note["board"] and frame.data_id == 0x90 and any(frame.payload)
-    ]
-    return max(currents, default=0) - min(currents, default=0) > 10
+    at = _at(note)
+    told = [frame for frame in heard if frame.address == note["board"] and frame.data_id == 0x90 and any(frame.payload)]
+    # A slow host's next current may come later than that; it is the first to tell of a step all the same.
+    near = {frame for frame in told if abs(frame.seconds - at) < RECENT_S}
+    near.update(
+        [frame for frame in told if frame.seconds < at][-1:], [frame for frame in told if frame.seconds > at][:1]
+    )
+    currents = [int.from_bytes(frame.payload[4:6]) for frame in near]
+    return max(currents, default=0) - min(currents, default=0) > STEP_RAW
 
 
 def _between(heard: list[Frame], first: float, last: float) -> list[Frame]:

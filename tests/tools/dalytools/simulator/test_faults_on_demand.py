@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dalytools.simulator.bus import Bus
 from dalytools.simulator.capture_file import heard
 from dalytools.simulator.harm import overlaid
+from dalytools.simulator.scenario import Event
 from dalytools.simulator.scenario_file import parsed, read_scenario, ready_made
 from dalytools.simulator.truth import KINDS, Truth
 
@@ -146,6 +148,17 @@ def test_another_board_answers_first() -> None:
     ]
     assert runs == [(0x41, "board 1", "board 2")] * 2
     assert all(good(piece.data) for piece in sent)
+
+
+def test_another_board_that_just_woke_answers_with_zeros() -> None:
+    """It is both: of zeros, and not from the board that was asked."""
+    made = read_scenario("wrong-board-answers")
+    woken = (Event(8, "sleep", 1, name="silence"), Event(9.9, "wake", 1))
+    _, notes = run(replace(made, events=(*woken, *made.events)), 20)
+    other = of(notes, "other_board")
+    assert [(note["board"], note["asked"]) for note in other] == [(1, 2), (1, 2)]
+    zeros = [note["time"] for note in of(notes, "zero_reply")]
+    assert all(note["time"] in zeros for note in other)
 
 
 def test_contradictions_are_in_single_replies() -> None:
