@@ -52,6 +52,8 @@ def test_damage_explains_only_where_it_is_a_good_frame() -> None:
     note = {"what": "damaged", "time": 1.5}
     assert explained("late", 1, 2.0, [heard(1.5, 1, 0x90)], [note], 1.5)
     assert not explained("late", 1, 2.0, [Frame(1.5, 13), heard(1.9, 1, 0x90)], [note], 1.5)
+    before = heard(1.5 - 13 / 960 + 1e-6, 1, 0x90)
+    assert not explained("late", 1, 2.0, [before, Frame(1.5, 13)], [note], 1.5)
 
 
 def test_an_echo_is_explained_by_the_same_request_of_another_host() -> None:

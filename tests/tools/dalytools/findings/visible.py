@@ -268,7 +268,7 @@ def explained(rule: str, board: int | None, seconds: float, heard: list[Frame], 
         for note in notes[bisect_left(notes, seconds - ago, key=_at) : bisect_left(notes, seconds + 1e-3, key=_at)]
         if note["what"] in {"damaged", "collision"} and note.get("harmed") is not False
         for frame in _there(note, heard)
-        if frame.good
+        if frame.good and frame.seconds + frame.size / 960 > _at(note) + 1e-4  # the one right before it is whole
     )
     return any(rule != "contradiction" or _still_held(frame, board, seconds, heard) for frame in accidents)
 
