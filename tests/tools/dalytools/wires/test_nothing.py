@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from tests.tools.dalytools.made import SAMPLES
+from tests.tools.dalytools.wires.each_command import every, run
 
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
@@ -18,19 +19,6 @@ if TYPE_CHECKING:
 
 TCP = SAMPLES / "wires" / "made-tcp.pcapng"
 BLE = SAMPLES / "wires" / "made-ble.pcapng"
-COMMANDS = {
-    "decode": ("decode",),
-    "check": ("check",),
-    "check alone": ("check", "--no-dissector"),
-    "report": ("report",),
-    "survey": ("survey",),
-}
-every = pytest.mark.parametrize("command", COMMANDS)
-
-
-def run(command: str, path: Path, tmp_path: Path, *options: str) -> int:
-    output = ("-o", str(tmp_path / "out.html")) if command == "report" else ()
-    return main([*COMMANDS[command], *options, str(path), *output])
 
 
 def _late(path: Path) -> Path:

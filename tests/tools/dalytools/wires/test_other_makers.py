@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from tests.tools.dalytools.made import ANSWER, ASK, a5
 from tests.tools.dalytools.wires.air import RECEIVED, SENT, Air, connected, data
+from tests.tools.dalytools.wires.each_command import every, run
 
 from dalyref.decoder import decode
 from dalytools.cli import main
@@ -158,21 +159,6 @@ def test_incomplete_packets_are_counted_from_the_beginning_on() -> None:
 def test_a_value_without_bytes_begins_nothing() -> None:
     made = air((RECEIVED, b""), (SENT, b"\x00"))
     assert taken(made, "17") == []
-
-
-COMMANDS = {
-    "decode": ("decode",),
-    "check": ("check",),
-    "check alone": ("check", "--no-dissector"),
-    "report": ("report",),
-    "survey": ("survey",),
-}
-every = pytest.mark.parametrize("command", COMMANDS)
-
-
-def run(command: str, path: str, tmp_path: Path, *options: str) -> int:
-    output = ("-o", str(tmp_path / "out.html")) if command == "report" else ()
-    return main([*COMMANDS[command], *options, path, *output])
 
 
 @every
