@@ -139,6 +139,7 @@ class Values(Watch):
                 self._zero[place].add(record.number, record.time_ns)
             return
         run = self._runs[place]
+        self._cleared(place, run.replies_at(record.time_ns))
         zero = run.reply(str(fields.get("daly.data", "")), fields.get("daly.data_id"))
         if zero is None:
             run.waiting.append((record.number, record.time_ns))

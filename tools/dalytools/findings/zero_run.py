@@ -3,7 +3,10 @@
 
     97 zeros (no cell is balanced: perhaps) | 98 zeros (no fault: perhaps) | 90 zeros: 0 V, none of them was true
 
-What may be true waits until a reply comes that can't be, or one that is not zero.
+What may be true waits until a reply comes that can't be, or one that is not zero. Right behind a reply that is not zero
+it is true, if the board then pauses: it did not sleep in between.
+
+    95: 3.3 V | 97 zeros, 98 zeros: true | the others have their turn, it sleeps and wakes | 90 zeros
 """
 
 from __future__ import annotations
@@ -16,6 +19,8 @@ _NUMBERED = frozenset((0x95, 0x96))
 """Of these zeros behind the frame number may be slots that are not used."""
 _ZERO = "00" * 8
 _MOST_WAITING = 64
+_PAUSE_NS = 2_000_000_000
+"""In less nobody presses a button, or turns a key, on a board that has just fallen asleep."""
 _FELL_SILENT = 2
 """So many unanswered requests, and what was zero before them is not of the same waking up."""
 
@@ -37,11 +42,22 @@ class ZeroRun:
     _perhaps_told: bool = False
     _unanswered: int = 0
     _answers: set[object] = field(default_factory=set[object])
+    _newest_ns: int = 0
+    _awake: bool = False
+    """It has made no pause since a reply that is not zero."""
 
     @property
     def running(self) -> bool:
         """Whether the newest reply was of zeros."""
         return self.proven or bool(self.waiting)
+
+    def replies_at(self, time_ns: int) -> set[str]:
+        """Take note of when a reply comes, before the reply; return faults that went for sure before a pause."""
+        paused = time_ns - self._newest_ns > _PAUSE_NS
+        self._newest_ns = time_ns
+        went = self.end() if paused and self._awake and not self.proven else set[str]()
+        self._awake = self._awake and not paused
+        return went
 
     def hide(self, cleared: set[str]) -> None:
         """Take note of a fault reply of zeros: no fault is set, if that is true."""
@@ -51,7 +67,10 @@ class ZeroRun:
     def unanswered(self, data_id: object) -> set[str]:
         """Take note of an unanswered request; return faults that went for sure. What it never answers says nothing."""
         self._unanswered += data_id in self._answers
-        return self.end() if self._unanswered >= _FELL_SILENT and not self.proven else set()
+        if self._unanswered < _FELL_SILENT:
+            return set()
+        self._awake = False
+        return set() if self.proven else self.end()
 
     def end(self) -> set[str]:
         """Take note of a reply that is not zero; return faults that went for sure."""
@@ -71,6 +90,7 @@ class ZeroRun:
         self._unanswered = 0
         self._answers.add(data_id)
         if data != _ZERO and not (data_id in _NUMBERED and data[2:] == _ZERO[2:]):
+            self._awake = True
             return False
         if self.proven:
             return True

@@ -486,6 +486,34 @@ def test_zeros_before_a_silence_are_not_of_the_waking_up_behind_it(tmp_path: Pat
     assert (zeros.tally.count, zeros.tally.first_packet) == (2, 10)
 
 
+@pytest.mark.parametrize(("pause", "of_waking"), [(8.0, 2), (1.0, 4)])
+def test_zeros_behind_an_answer_are_right_if_a_pause_follows(pause: float, of_waking: int, tmp_path: Path) -> None:
+    """The end of a poll: nothing is balanced, no fault. Others have their turn, it sleeps and wakes, and says zeros."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        *asked(0.4, 0x97, a5(1, 0x97)),
+        *asked(0.8, 0x98, FINE),
+        *asked(0.8 + pause, 0x98, FINE),
+        *asked(1.2 + pause, 0x90, a5(1, 0x90)),
+        *asked(15, 0x90, PACK),
+    ]
+    zeros = one(search(capture(tmp_path / "turn.pcapng", [*packets, *LATER])), "zero-reply")
+    assert zeros.tally.count == of_waking
+
+
+def test_zeros_of_waking_up_may_have_a_pause_between_them(tmp_path: Path) -> None:
+    """It woke just before the end of its turn."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        *asked(8, 0x97, a5(1, 0x97)),
+        *asked(8.4, 0x98, FINE),
+        *asked(16, 0x90, a5(1, 0x90)),
+        *asked(16.4, 0x90, PACK),
+    ]
+    zeros = one(search(capture(tmp_path / "turn.pcapng", [*packets, *LATER])), "zero-reply")
+    assert zeros.tally.count == 3
+
+
 def _d2_says(soc: int) -> str:
     """A read of 0028 to 002A: 19.8 V, 0 A, SOC in 0.1 %."""
     return brings(198, 30000, soc)
