@@ -184,7 +184,13 @@ def judge(
         and moment.rule not in of_it
         and not _caused(moment, everything)
         and not explained(
-            moment.rule, moment.place.board, moment.seconds, heard, everything, LONG_AGO_S.get(moment.rule, AGO_S)
+            moment.rule,
+            moment.place.board,
+            moment.seconds,
+            heard,
+            everything,
+            LONG_AGO_S.get(moment.rule, AGO_S),
+            moment.place.detail,
         )
         and not (moment.rule == "contradiction" and _load_unknown(moment, heard, phase))
     ]

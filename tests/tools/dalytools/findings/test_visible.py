@@ -56,6 +56,25 @@ def test_damage_explains_only_where_it_is_a_good_frame() -> None:
     assert not explained("late", 1, 2.0, [before, Frame(1.5, 13)], [note], 1.5)
 
 
+def test_cells_that_came_by_accident_explain_until_there_is_a_newer_table() -> None:
+    note = {"what": "damaged", "time": 2.0136}
+    count, first, accident = heard(1, 1, 0x94, "0601"), heard(2, 1, 0x95, "010ce4"), heard(2.0136, 1, 0x95, "02ffff")
+    part, rest = heard(3, 1, 0x95, "010ce4"), heard(3.0136, 1, 0x95, "020ce4")
+    told = [count, first, accident, heard(2.5, 1, 0x96, "01"), part]
+
+    def tells(frames: list[Frame], detail: str, board: int = 1) -> bool:
+        says = [heard(4, 1, 0x91, "0d0d"), heard(4, 1, 0x92, "3c")]
+        return explained("contradiction", board, 4.0, [*frames, *says], [note], 11.0, detail)
+
+    assert tells(told, "cell_max")
+    assert tells(told, "pack_voltage")
+    assert not tells(told, "temperature_max")
+    assert not tells(told, "cell_max", board=2)
+    assert not tells([*told, rest], "cell_max")
+    assert not tells([count, accident, part], "cell_max")  # in no table
+    assert not tells([count, accident, part, rest], "cell_max")
+
+
 def test_an_echo_is_explained_by_the_same_request_of_another_host() -> None:
     note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x43, "data_id": 0x90}
     both = [heard(1.0, 0x43, 0x90), heard(1.03, 0x43, 0x90)]

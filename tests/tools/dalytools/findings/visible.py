@@ -34,6 +34,17 @@ RECENT_S = 10.0
 TABLE_OF = {0x90: 0x95, 0x91: 0x95, 0x92: 0x96}
 """What a reply is held against (docs/records.md 11)."""
 SLOTS = {0x95: 3, 0x96: 7}
+SAID_BY = {
+    "pack_voltage": {0x90, 0x94, 0x95},
+    "cell_max": {0x91, 0x94, 0x95},
+    "cell_min": {0x91, 0x94, 0x95},
+    "cell_number": {0x91, 0x94},
+    "temperature_max": {0x92, 0x94, 0x96},
+    "temperature_min": {0x92, 0x94, 0x96},
+    "sensor_number": {0x92, 0x94},
+    "soc": {0x90},
+}
+"""Contradiction: the IDs that it is told from (docs/records.md 11; 94 tells which slots are cells)."""
 STEP_RAW = 10
 """1 A."""
 IN_SAME_GAP_S = 0.6
@@ -154,7 +165,7 @@ def _goes_on(before: Frame, frame: Frame) -> bool:
     """Tell whether two replies of an ID are of one burst (records.md 8); the same number twice may be two bursts."""
     return (
         frame.data_id in BURSTS
-        and frame.address == before.address
+        and (frame.address, frame.data_id) == (before.address, before.data_id)
         and frame.seconds - before.seconds < BURST_QUIET_S
         and frame.payload[0] > before.payload[0]
     )
@@ -221,18 +232,27 @@ def _no_table(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
         return False
     mine = [frame for frame in heard if frame.address == note["board"]]
     tables = _tables(mine, TABLE_OF[data_id])
-    before = [table for table in tables if table[0] < at]
-    behind = [table for table in tables if table[0] >= at]
+    before = [table for table in tables if table.whole < at]
+    behind = [table for table in tables if table.whole >= at]
     again = min((frame.seconds for frame in mine if frame.data_id == data_id and frame.seconds >= at), default=1e9)
-    near_before = bool(before) and at - before[-1][0] < RECENT_S and before[-1][1]
-    near_behind = bool(behind) and behind[0][0] - at < RECENT_S and behind[0][0] < again and behind[0][1]
+    near_before = bool(before) and at - before[-1].whole < RECENT_S and before[-1].some
+    near_behind = bool(behind) and behind[0].whole - at < RECENT_S and behind[0].whole < again and behind[0].some
     return not near_before and not near_behind
 
 
-def _tables(mine: list[Frame], data_id: int) -> list[tuple[float, bool]]:
-    """Return when one board's tables were whole, and whether anything but zeros was in them."""
-    out: list[tuple[float, bool]] = []
+class Table(NamedTuple):
+    """A table of one board: when it begins and when it is whole, s; whether anything but zeros is in it."""
+
+    begins: float
+    whole: float
+    some: bool
+
+
+def _tables(mine: list[Frame], data_id: int) -> list[Table]:
+    """Return one board's tables that became whole."""
+    out: list[Table] = []
     count = following = 0
+    begins = 0.0
     some = False
     before: Frame | None = None
     for frame in mine:
@@ -244,15 +264,20 @@ def _tables(mine: list[Frame], data_id: int) -> list[tuple[float, bool]]:
                 following += 1 if following and number == before.payload[0] + 1 else -following
                 some = some or any(frame.payload[1:7])
             else:
-                following, some = int(number <= 1), any(frame.payload[1:7])
+                begins, following, some = frame.seconds, int(number <= 1), any(frame.payload[1:7])
             if count and following == -(-count // SLOTS[data_id]):
-                out.append((frame.seconds, some))
+                out.append(Table(begins, frame.seconds, some))
         before = frame
     return out
 
 
-def explained(rule: str, board: int | None, seconds: float, heard: list[Frame], notes: list[Note], ago: float) -> bool:
-    """Tell whether the bytes can't but say what was found, though nothing of the kind was put in."""
+def explained(
+    rule: str, board: int | None, seconds: float, heard: list[Frame], notes: list[Note], ago: float, detail: str = ""
+) -> bool:
+    """Tell whether the bytes can't but say what was found, though nothing of the kind was put in.
+
+    detail: which contradiction it is.
+    """
     if rule == "echo":
         return any(
             note["what"] == "unanswered" and note.get("why") == "busy" and _same_request(note, seconds, heard)
@@ -270,17 +295,20 @@ def explained(rule: str, board: int | None, seconds: float, heard: list[Frame], 
         for frame in _there(note, heard)
         if frame.good and frame.seconds + frame.size / 960 > _at(note) + 1e-4  # the one right before it is whole
     )
-    return any(rule != "contradiction" or _still_held(frame, board, seconds, heard) for frame in accidents)
-
-
-def _still_held(accident: Frame, board: int | None, seconds: float, heard: list[Frame]) -> bool:
-    """Tell whether what came by accident is that board's newest reply of its ID (and number) at that time."""
-    what = accident.address, accident.data_id, accident.payload[0] if accident.data_id in BURSTS else 0
-    return accident.address == board and not any(
-        (frame.address, frame.data_id, frame.payload[0] if frame.data_id in BURSTS else 0) == what
-        for frame in _between(heard, accident.seconds + 1e-6, seconds)
-        if frame.good
+    return any(
+        rule != "contradiction"
+        or (accident.address == board and accident.data_id in SAID_BY[detail] and _held(accident, seconds, heard))
+        for accident in accidents
     )
+
+
+def _held(accident: Frame, seconds: float, heard: list[Frame]) -> bool:
+    """Tell whether what came by accident counts at that time: no newer reply of its ID, or table, is there by then."""
+    mine = [frame for frame in heard if frame.address == accident.address and frame.seconds < seconds + 1e-6]
+    if accident.data_id not in SLOTS:
+        return not any(frame.data_id == accident.data_id and frame.seconds > accident.seconds + 1e-6 for frame in mine)
+    tables = [table for table in _tables(mine, accident.data_id) if table.whole > accident.seconds - 1e-6]
+    return len(tables) == 1 and tables[0].begins < accident.seconds + 1e-6
 
 
 def _same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
