@@ -12,7 +12,7 @@ local byte, find = string.byte, string.find
 
 local A5, A5_COUNT, A5_LENGTH = 0xA5, 8, 13
 local MODBUS_REPLY = "^[\xD2\x51-\x60]\3" -- to a read; then the number of bytes behind it, and a CRC
-local MOST_READ, AROUND = 250, 5
+local MOST_READ, AROUND = 252, 5
 
 -- Whether a value begins with the head of a frame that is longer than it.
 local function goes_on(value)

@@ -19,7 +19,7 @@ local byte, find, sub = string.byte, string.find, string.sub
 
 -- A junk record, and a gap that can be somebody else's traffic, are at most so long.
 local LONGEST_RUN = 4096
--- No window is longer (255), so what lies further back than this is decided.
+-- No window is longer (257), so what lies further back than this is decided.
 local REACH = 260
 
 -- Whether W, a good A5 window buf[s..e], is a frame: true, false, or nil when the bytes to tell are not there.

@@ -6,7 +6,7 @@
 --   Modbus RTU    addr fn ... crc_lo crc_hi                               field notes d; docs/records.md 2
 --
 --     read request      addr 03 start.2 count.2                crc.2      D2, 81..90
---     read reply        addr 03 n data.n                       crc.2      D2, 51..60; n even, 2..250
+--     read reply        addr 03 n data.n                       crc.2      D2, 51..60; n even, 2..252
 --     write one         addr 06 register.2 value.2             crc.2      D2, 81..90, 51..60
 --     write many        addr 10 start.2 count.2 data.2c        crc.2      D2, 81..90; as Daly sends it
 --                       addr 10 start.2 count.2 2c data.2c     crc.2      D2, 81..90; as the standard has it
@@ -29,6 +29,8 @@ end
 
 -- Modbus's own limit for a write of several registers.
 local MOST_WRITTEN = 123
+-- Bytes of a read reply: 126 registers, which the WiFi module reads at once (field notes d; Modbus allows 125).
+local MOST_READ = 252
 
 -- CRC-16 without bit operations, which plain Lua 5.2 to 5.4 do not share: exclusive or by a table of all byte pairs,
 -- made when the first Modbus frame is looked at.
@@ -140,7 +142,7 @@ local function modbus_lengths(buf, p, n)
       return dialect, asked
     elseif not b2 then
       return dialect, nil
-    elseif b2 % 2 == 0 and b2 >= 2 and b2 <= 250 then
+    elseif b2 % 2 == 0 and b2 >= 2 and b2 <= MOST_READ then
       local answered = 5 + b2
       if not asked then
         return dialect, answered

@@ -265,6 +265,8 @@ LIMITS_D2_TOLD = {
     "setting.temp_difference_1": 255,
     "setting.temp_difference_2": 255,
 }
+WIFI_D2 = [*ALL_D2, 0, 0, 30000, 0, 65, 62, *[0] * 58]
+"""00 to 7D, 126 registers, as the WiFi module asks for them (field notes d): no balance current, MOS 25 C."""
 VERSION_D2 = [0x3130, 0x5F32, *[0] * 14, *[0] * 16]
 """A9 to C8: "10_2" as sent."""
 
@@ -678,6 +680,10 @@ CASES: dict[str, list[Heard]] = {
         told(ALL_81, 0, 0, address=0x51, modbus__assumed=True, also=ALL_81_SHOWN),
         told(changed(ALL_81, (0x3C, 49)), 1, address=0x51),
         told(ALL_81[:61], 2, address=0x51),
+    ],
+    "the WiFi module asks for 126 at once": [
+        Heard("d2030000007ed649", 0, {"direction": 1, "modbus.register": 0, "modbus.count": 126}),
+        told(WIFI_D2, 0.3, 0, 1, also=ALL_D2_SHOWN),
     ],
     "81 is not read as D2": [told(ALL_81, 0), told(ALL_D2, 1, address=0x51)],
     "limits prove themselves": [

@@ -206,7 +206,7 @@ class Traffic:
         asks = r.choice((0xD2, 0x80 + board))
         answers = r.choice((0xD2, 0x50 + board))
         two = bytes((r.choice((0, 0, 1)), r.randrange(256)))
-        count = r.choice((1, 2, 3, 62))
+        count = r.choice((1, 2, 3, 62, 126))
         match style:
             case 0:
                 return with_crc(bytes((asks, 3)) + two + count.to_bytes(2, "big"))

@@ -223,6 +223,7 @@ _HEADS = (
     bytes.fromhex("5103040ce40ce5"),
     bytes.fromhex("6003fa"),
     bytes.fromhex("d203fc"),
+    bytes.fromhex("d203fe"),
     bytes.fromhex("51030b"),
     bytes.fromhex("d20300"),
     bytes.fromhex("81037c"),

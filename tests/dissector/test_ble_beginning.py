@@ -60,7 +60,7 @@ NEARLY: Talk = [
     (TELL, "d203"),
     (TELL, "d2030500"),  # an odd number of bytes
     (TELL, "d2030000"),  # none
-    (TELL, "d203fc00"),  # 252
+    (TELL, "d203fe00"),  # 254
     (TELL, "6103" + "4000"),
     (TELL, "5003" + "4000"),
     (ASK, "8103" + "4000"),
@@ -116,7 +116,7 @@ def test_from_the_first_frame_on_all_is_taken(dissect: Dissect, passes: str) -> 
     assert number(rows[7], "pack.voltage") == 53.3
 
 
-LONGEST = with_crc(bytes.fromhex("5103fa" + "00" * 250)).hex()
+LONGEST = with_crc(bytes.fromhex("5103fc" + "00" * 252)).hex()
 SHORT = with_crc(bytes.fromhex("60030400010002")).hex()
 FIRST = [
     (REPLY[:8], REPLY[8:], "pack.voltage", 53.3),

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 READ, WRITE_ONE, WRITE_MANY = 0x03, 0x06, 0x10
 EXCEPTIONS = (0x83, 0x86, 0x90)
-LARGEST_READ = 250
-"""Data bytes of a read reply."""
+LARGEST_READ = 252
+"""Data bytes of a read reply: 126 registers, which the WiFi module reads at once (field notes d; Modbus allows 125)."""
 LARGEST_WRITE = 123
 """Registers of a write: Modbus's own limit."""
-LONGEST = 255
+LONGEST = 257
 """Bytes of the longest window."""
 
 POLYNOMIAL = 0xA001

@@ -26,6 +26,7 @@ ASK, ANSWER = "a5409008" + 8 * "00" + "7d", "a501900800f80000753001815d"
         "d2037c",  # 62 registers in 129 bytes
         "d2037c" + 125 * "00",  # 128 of them
         "5103fa0ce4",
+        "d203fc0ce4",  # the WiFi module's 126 registers
         "600302000c0a",  # six of seven
     ],
 )
@@ -45,7 +46,7 @@ def test_a_frame_or_the_head_of_a_longer_one_begins(value: str) -> None:
         "d203",
         "d20300",
         "d203030000",  # odd
-        "d203fc0000",  # no reply is that long
+        "d203fe0000",  # no reply is that long
         "d203020001fc57",  # whole, and damaged
         "d2037c" + 126 * "00",
         "d206000c",  # the head of a write

@@ -64,7 +64,7 @@ def test_real_modbus(row: real.Row) -> None:
         "608602",
         "519003",
         "5103 02 0000",  # the shortest read reply
-        "5103 fa" + "11" * 250,  # and the longest
+        "5103 fc" + "11" * 252,  # and the longest
         "d210 0000 007b" + "22" * 246,  # 123 registers
         "d210 0000 007b f6" + "22" * 246,
     ],
@@ -84,7 +84,7 @@ def test_windows(head: str) -> None:
     [
         "5103 03 000000",  # odd byte count
         "5103 00",
-        "5103 fc" + "11" * 252,
+        "5103 fe" + "11" * 254,
         "510300000001",  # a request with a reply's address
         "8103 02 0000",  # a reply with a request's address
         "5006000c0001",  # 50 and 61 are no addresses

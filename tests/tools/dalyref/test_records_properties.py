@@ -73,7 +73,7 @@ def literal_windows(data: bytes) -> list[tuple[int, int]]:
         if a5.is_good(rest):
             found.append((start + 13, start))
         d2, ask, answer = rest[0] == 0xD2, 0x81 <= rest[0] <= 0x90, 0x51 <= rest[0] <= 0x60
-        for length in range(5, min(len(rest), 255) + 1):
+        for length in range(5, min(len(rest), 257) + 1):
             if modbus.crc(rest[:length]) != 0:
                 continue
             function = rest[1]
@@ -84,7 +84,7 @@ def literal_windows(data: bytes) -> list[tuple[int, int]]:
                     function == 3
                     and length == 5 + rest[2]
                     and rest[2] % 2 == 0
-                    and 2 <= rest[2] <= 250
+                    and 2 <= rest[2] <= 252
                     and (d2 or answer)
                 )
                 or (function == 6 and length == 8 and (d2 or ask or answer))

@@ -20,8 +20,9 @@ from typing import Final
 READ, WRITE_ONE, WRITE_MANY = 0x03, 0x06, 0x10
 D2: Final = 0xD2
 ASKS_81, ANSWERS_81 = 0x80, 0x50
-MAX_COUNT: Final = 125  # registers in one reply
-MAX_REQUEST: Final = 9 + 2 * MAX_COUNT  # bytes
+MAX_READ: Final = 126  # registers; the WiFi module asks for so many at once (field notes d)
+MAX_WRITTEN: Final = 123
+MAX_REQUEST: Final = 9 + 2 * MAX_WRITTEN  # bytes
 
 
 def _crc_table() -> tuple[int, ...]:
@@ -84,7 +85,7 @@ def request_length(data: bytes) -> int:
     if data[1] == WRITE_MANY:
         values = 2 * int.from_bytes(data[4:6])
         for size in (6 + values, 7 + values):
-            if 0 < values <= 2 * MAX_COUNT and len(data) >= size + 2 and sealed(data[:size]) == data[: size + 2]:
+            if 0 < values <= 2 * MAX_WRITTEN and len(data) >= size + 2 and sealed(data[:size]) == data[: size + 2]:
                 return size + 2
     return 0
 
@@ -98,7 +99,7 @@ def may_become_request(data: bytes) -> bool:
     if len(data) < 8:
         return True
     count = int.from_bytes(data[4:6])
-    return data[1] == WRITE_MANY and 0 < count <= MAX_COUNT and len(data) < 9 + 2 * count
+    return data[1] == WRITE_MANY and 0 < count <= MAX_WRITTEN and len(data) < 9 + 2 * count
 
 
 def parse(data: bytes) -> Request | None:
@@ -107,7 +108,7 @@ def parse(data: bytes) -> Request | None:
         return None
     register, number = int.from_bytes(data[2:4]), int.from_bytes(data[4:6])
     if data[1] == READ:
-        return Request(data[0], READ, register, number) if 0 < number <= MAX_COUNT else None
+        return Request(data[0], READ, register, number) if 0 < number <= MAX_READ else None
     if data[1] == WRITE_ONE:
         return Request(data[0], WRITE_ONE, register, 1, (number,))
     body = data[-2 - 2 * number : -2]

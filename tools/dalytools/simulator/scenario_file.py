@@ -199,7 +199,7 @@ def _host(table: Table) -> Host:
     default = Host()
     reads: list[tuple[int, int]] = []
     for read in table.tables("reads"):
-        reads.append((read.integer("register", 0, 0, 0xFFFF), read.integer("count", 1, 1, modbus.MAX_COUNT)))
+        reads.append((read.integer("register", 0, 0, 0xFFFF), read.integer("count", 1, 1, modbus.MAX_READ)))
         read.end()
     address = table.integer("address", 0, 0x20, 0xFF, shown="an address of a host, 0x20 to 0xff (0x41 asks board 2)")
     return _checked(

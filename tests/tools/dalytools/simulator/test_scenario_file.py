@@ -77,8 +77,8 @@ def test_ready_made_ones_are_read_and_tell_what_they_show() -> None:
         ("[[host]]\nplan = [256]", "must be a list of data IDs"),
         ("[[host]]\nplan = []", "at least one data ID"),
         (
-            "[[host]]\nreads = [{register = 1, count = 126}]",
-            "host 1: reads 1: count = 126: must be a whole number from 1",
+            "[[host]]\nreads = [{register = 1, count = 127}]",
+            "host 1: reads 1: count = 127: must be a whole number from 1",
         ),
         ("[damage]\ndrop = 0.6\ncut = 0.6", "damage: damage to 1.2 of the frames: must be 0 to 1 in all"),
         ("[damage]\ndrop = nan", "damage: drop = nan: must be a number from 0 to 1"),
