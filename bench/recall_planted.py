@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from tests.tools.dalytools.findings.recall import Note
+    from tests.tools.dalytools.findings.moments import Note
 
     from dalyref.packet import Packet
 

@@ -8,13 +8,15 @@ of a warning or an error its note.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 from unittest import mock
 
+from tests.tools.dalytools.findings.explained import explained
+from tests.tools.dalytools.findings.heard import Frame, frames
 from tests.tools.dalytools.findings.injected import search
-from tests.tools.dalytools.findings.visible import Frame, explained, frames, hidden
+from tests.tools.dalytools.findings.moments import Moment, Note, at, during
+from tests.tools.dalytools.findings.visible import hidden, sent_by
 
 from dalytools.findings.finding import Finding, Severity, Tally
 from dalytools.simulator.capture_file import write_capture
@@ -25,17 +27,6 @@ if TYPE_CHECKING:
 
     from dalytools.findings.place import Place
     from dalytools.simulator.scenario import Scenario
-
-Note = Mapping[str, object]
-
-
-class Moment(NamedTuple):
-    """One of the times that a rule counted something, s from the beginning."""
-
-    rule: str
-    place: Place
-    severity: Severity
-    seconds: float
 
 
 class Rule(NamedTuple):
@@ -53,8 +44,8 @@ FOUND_BY = {
     "late": Rule(("late", "wrong-board", "burst-repeat"), 0.01, 1.0),
     "echo": Rule(("echo",), 0.01, 0.01),
     "zero_reply": Rule(("zero-reply",), 0.01, 0.3),
-    # A damaged record begins with the first of several damaged frames in a row.
-    "damaged": Rule(("damaged", "line-errors"), 0.3, 0.3),
+    # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus.
+    "damaged": Rule(("damaged", "line-errors"), 0.35, 0.3),
     # Two that begin at once can sum up right: a reply of nobody. One right behind the other harms no byte.
     "collision": Rule(("damaged", "line-errors", "zero-reply", "unasked", "unanswered"), 0.3, 0.3),
     # Behind the last cell or sensor there is nothing to miss: another number of frames than usual.
@@ -87,11 +78,11 @@ PLANTED = {
 }
 """What the simulator does not do, and ``judge`` may be given."""
 CAUSES = {
-    "silent": ("unanswered", "damaged", "collision", "modbus_ambiguous"),
-    "unanswered": ("unanswered", "damaged", "collision", "write", "modbus_ambiguous"),
+    "silent": ("unanswered",),
+    "unanswered": ("unanswered", "modbus_ambiguous"),
     "asleep": ("unanswered", "echo"),
     "other-dialect": ("unanswered",),
-    "unasked": ("late", "damaged", "collision", "other_board"),
+    "unasked": ("late", "collision", "other_board"),
     "late": ("late", "other_board"),
     # Behind the answer to another host's newer request, a late reply goes to one that names another board.
     "wrong-board": ("other_board", "late"),
@@ -156,16 +147,16 @@ def judge(
         out = Judged(findings=search(path))
     moments = sorted(
         (
-            Moment(finding.rule, finding.place, finding.severity, at)
+            Moment(finding.rule, finding.place, finding.severity, seconds)
             for finding in out.findings
             if id(finding.tally) in counted
-            for at in counted[id(finding.tally)][1]
+            for seconds in counted[id(finding.tally)][1]
         ),
         key=_seconds,
     )
     heard = frames(path, scenario.start_ns)
     last = max(frame.seconds for frame in heard)
-    everything: list[Note] = sorted([*written.truth.notes, *more], key=_at)
+    everything: list[Note] = sorted([*written.truth.notes, *more], key=at)
     out.notes = [note for note in everything if note["what"] in FOUND_BY | PLANTED and _told(note, last, wire)]
     for note in out.notes:
         if not _found(note, moments):
@@ -183,15 +174,7 @@ def judge(
         if moment.severity > Severity.NOTE
         and moment.rule not in of_it
         and not _caused(moment, everything)
-        and not explained(
-            moment.rule,
-            moment.place.board,
-            moment.seconds,
-            heard,
-            everything,
-            LONG_AGO_S.get(moment.rule, AGO_S),
-            moment.place.detail,
-        )
+        and not explained(moment, heard, everything, LONG_AGO_S.get(moment.rule, AGO_S))
         and not (moment.rule == "contradiction" and _load_unknown(moment, heard, phase))
     ]
     return out
@@ -199,10 +182,6 @@ def judge(
 
 def _seconds(moment: Moment) -> float:
     return moment.seconds
-
-
-def _at(note: Note) -> float:
-    return float(str(note["time"]))
 
 
 def _told(note: Note, last: float, wire: str) -> bool:
@@ -214,7 +193,7 @@ def _told(note: Note, last: float, wire: str) -> bool:
     ):  # CAN hears no echo, carries A5 alone, and an error frame stands only for what began as such
         return False
     settled = 1.1 if note["what"] == "unanswered" else 0.5
-    return not note.get("open") and _at(note) + settled < last
+    return not note.get("open") and at(note) + settled < last
 
 
 def _rule(note: Note) -> Rule:
@@ -225,10 +204,9 @@ def _rule(note: Note) -> Rule:
 
 def _found(note: Note, moments: list[Moment]) -> bool:
     rule = _rule(note)
-    at = _at(note)
-    near = moments[bisect_left(moments, at - rule.before, key=_seconds) :]
+    near = moments[bisect_left(moments, at(note) - rule.before, key=_seconds) :]
     for moment in near:
-        if moment.seconds > at + rule.after:
+        if moment.seconds > at(note) + rule.after:
             return False
         if moment.rule in rule.rules and _fits(note, moment.place):
             return True
@@ -254,7 +232,26 @@ def _load_unknown(moment: Moment, heard: list[Frame], phase: float) -> bool:
 
 
 def _caused(moment: Moment, notes: list[Note]) -> bool:
-    planted = moment.rule.replace("-", "_")
+    """Tell whether a note of its place is behind it: one that this rule finds, in time; or another, not long before."""
+    causes = {*CAUSES.get(moment.rule, ()), *PLANTED.keys() & {moment.rule.replace("-", "_")}}
     ago = LONG_AGO_S.get(moment.rule, AGO_S)
-    near = notes[bisect_left(notes, moment.seconds - ago, key=_at) : bisect_left(notes, moment.seconds + 0.3, key=_at)]
-    return any(note["what"] in (*CAUSES.get(moment.rule, ()), planted) for note in near)
+    return any(
+        note["what"] in causes
+        and _fits(note, moment.place)
+        and _of_its_board(note, moment)
+        and (moment.rule not in _rule(note).rules or _in_time(note, moment.seconds))
+        for note in during(notes, moment.seconds - ago, moment.seconds + 0.3)
+    )
+
+
+def _of_its_board(note: Note, moment: Moment) -> bool:
+    """Tell whether damage can be behind something in an answer of several frames: it fell on the board's own bytes."""
+    board = moment.place.board
+    if board is None or note["what"] not in {"damaged", "collision"} or not moment.rule.startswith("burst-"):
+        return True
+    return sent_by(note, board)
+
+
+def _in_time(note: Note, seconds: float) -> bool:
+    rule = _rule(note)
+    return at(note) - rule.before - 1e-6 <= seconds <= at(note) + rule.after + 1e-6

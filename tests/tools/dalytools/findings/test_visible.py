@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from tests.tools.dalytools.findings.visible import Frame, explained, hidden
+from tests.tools.dalytools.findings.heard import Frame
+from tests.tools.dalytools.findings.visible import hidden
 
 
 def heard(seconds: float, address: int, data_id: int, payload: str = "") -> Frame:
@@ -48,36 +49,51 @@ def test_a_frame_left_out_and_doubled_comes_once() -> None:
     assert not hidden(repeated, [once, again], [repeated, skipped])
 
 
-def test_damage_explains_only_where_it_is_a_good_frame() -> None:
-    note = {"what": "damaged", "time": 1.5}
-    assert explained("late", 1, 2.0, [heard(1.5, 1, 0x90)], [note], 1.5)
-    assert not explained("late", 1, 2.0, [Frame(1.5, 13), heard(1.9, 1, 0x90)], [note], 1.5)
-    before = heard(1.5 - 13 / 960 + 1e-6, 1, 0x90)
-    assert not explained("late", 1, 2.0, [before, Frame(1.5, 13)], [note], 1.5)
-
-
-def test_cells_that_came_by_accident_explain_until_there_is_a_newer_table() -> None:
-    note = {"what": "damaged", "time": 2.0136}
-    count, first, accident = heard(1, 1, 0x94, "0601"), heard(2, 1, 0x95, "010ce4"), heard(2.0136, 1, 0x95, "02ffff")
-    part, rest = heard(3, 1, 0x95, "010ce4"), heard(3.0136, 1, 0x95, "020ce4")
-    told = [count, first, accident, heard(2.5, 1, 0x96, "01"), part]
-
-    def tells(frames: list[Frame], detail: str, board: int = 1) -> bool:
-        says = [heard(4, 1, 0x91, "0d0d"), heard(4, 1, 0x92, "3c")]
-        return explained("contradiction", board, 4.0, [*frames, *says], [note], 11.0, detail)
-
-    assert tells(told, "cell_max")
-    assert tells(told, "pack_voltage")
-    assert not tells(told, "temperature_max")
-    assert not tells(told, "cell_max", board=2)
-    assert not tells([*told, rest], "cell_max")
-    assert not tells([count, accident, part], "cell_max")  # in no table
-    assert not tells([count, accident, part, rest], "cell_max")
-
-
-def test_an_echo_is_explained_by_the_same_request_of_another_host() -> None:
-    note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x43, "data_id": 0x90}
+def test_an_echo_of_another_host_is_no_request() -> None:
+    note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x43, "data_id": 0x90, "board": 4}
     both = [heard(1.0, 0x43, 0x90), heard(1.03, 0x43, 0x90)]
-    assert explained("echo", 4, 1.03, both, [note], 1.5)
-    assert not explained("echo", 4, 1.03, both[1:], [note], 1.5)
-    assert not explained("echo", 4, 1.03, both, [{**note, "why": "silent"}], 1.5)
+    assert hidden(note, both, [note])
+    assert not hidden(note, both[1:], [note])
+    assert not hidden({**note, "why": "silent"}, both, [note])
+    assert not hidden(note, [frame._replace(size=16) for frame in both], [note])
+
+
+def test_a_late_reply_that_a_newer_request_takes_is_not_late() -> None:
+    note = {"what": "late", "time": 5.0, "board": 1, "data_id": 0x90}
+    newer, comes = heard(4.8, 0x40, 0x90), heard(5.0, 1, 0x90)
+    assert hidden(note, [newer, comes], [note])
+    assert not hidden(note, [comes], [note])
+    assert not hidden(note, [newer, heard(4.85, 1, 0x90), comes], [note])
+    assert not hidden(note, [heard(4.3, 0x40, 0x90), comes], [note])  # late for this one too
+    assert not hidden(note, [heard(4.8, 0x41, 0x90), comes], [note])
+
+
+def test_what_was_damaged_is_hidden_only_where_nothing_of_it_was_heard() -> None:
+    note = {"what": "other_board", "time": 5.0, "board": 2, "data_id": 0x90}
+    damaged = {"what": "damaged", "time": 5.0, "sender": "board 2"}
+    assert hidden(note, [Frame(5.0, 13)], [note, damaged])
+    assert not hidden(note, [Frame(5.0, 13)], [note, {**damaged, "sender": "board 1"}])
+    assert not hidden(note, [Frame(5.0, 13)], [note, {**damaged, "time": 4.9}])
+    assert not hidden(note, [heard(5.0, 2, 0x90)], [note, damaged])
+    repeated = {"what": "repeated_frame", "time": 5.0, "board": 2, "data_id": 0x95, "frame": 1}
+    assert hidden(repeated, [heard(5.0, 2, 0x95, "01"), Frame(5.0136, 13)], [repeated, damaged])
+    assert not hidden(repeated, [heard(5.0, 2, 0x95, "01"), heard(5.0136, 2, 0x95, "01")], [repeated, damaged])
+
+
+def test_a_foreign_device_is_not_told_from_damage_in_the_same_gap() -> None:
+    note, damaged = {"what": "foreign", "time": 5.0}, {"what": "damaged", "time": 5.1}
+    theirs, harmed = Frame(5.0, 8), Frame(5.1, 9)
+    assert hidden(note, [theirs, harmed], [note, damaged])
+    assert not hidden(note, [theirs], [note])
+    assert not hidden(note, [theirs, heard(5.05, 1, 0x90), harmed], [note, damaged])
+    assert not hidden(note, [theirs, Frame(5.05, 8, modbus=True), harmed], [note, damaged])
+    assert not hidden(note, [theirs, Frame(5.3, 9)], [note, {**damaged, "time": 5.3}])  # silence between
+    before = [Frame(4.9, 9), theirs]
+    assert hidden(note, before, [{**damaged, "time": 4.9}, note])
+    assert not hidden(note, before, [{**damaged, "time": 4.9, "harmed": False}, note])
+
+
+def test_damage_that_left_nothing_is_no_good_frame() -> None:
+    note = {"what": "damaged", "time": 5.0}
+    assert hidden(note, [heard(5.0, 1, 0x90)], [note])
+    assert not hidden(note, [heard(6.0, 1, 0x90)], [note])

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Whether the bytes can't but say what a rule found, though nothing of the kind was put in.
+
+Damage can be a good frame by accident, two may ask the same, and zeros may be true: each reason is told by the bytes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tests.tools.dalytools.findings.heard import SLOTS, Frame, tables
+from tests.tools.dalytools.findings.moments import at, during
+from tests.tools.dalytools.findings.own_answers import answers
+from tests.tools.dalytools.findings.visible import LONGEST_S, WAITS_S, exception_fits, same_request, there_at
+
+if TYPE_CHECKING:
+    from tests.tools.dalytools.findings.moments import Moment, Note
+
+SAID_BY = {
+    "pack_voltage": {0x90, 0x94, 0x95},
+    "cell_max": {0x91, 0x94, 0x95},
+    "cell_min": {0x91, 0x94, 0x95},
+    "cell_number": {0x91, 0x94},
+    "temperature_max": {0x92, 0x94, 0x96},
+    "temperature_min": {0x92, 0x94, 0x96},
+    "sensor_number": {0x92, 0x94},
+    "soc": {0x90},
+}
+"""Contradiction: the IDs that it is told from (docs/records.md 11; 94 tells which slots are cells)."""
+
+
+def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float) -> bool:
+    """Tell whether the bytes say it. ago: how long before it what counts then may have come, s."""
+    seconds = moment.seconds
+    if moment.rule == "echo":
+        return any(
+            note["what"] == "unanswered" and note.get("why") == "busy" and same_request(note, seconds, heard)
+            for note in during(notes, seconds - 1e-3, seconds + 1e-3)
+        )
+    if moment.rule == "modbus-ambiguous":
+        return any(
+            note["what"] == "unanswered" and "register" in note and exception_fits(note, heard, notes)
+            for note in during(notes, seconds - WAITS_S, seconds)
+        )
+    if moment.rule in {"unanswered", "silent"} and (
+        _harmed(moment, notes) or _newer_is_answered(moment, heard, notes) or _denied(moment, notes)
+    ):
+        return True
+    if moment.rule == "zero-reply" and _behind_zeros(moment, heard, notes):
+        return True
+    return any(
+        _tells(accident, moment, heard)
+        for note in during(notes, seconds - ago, seconds + 1e-3)
+        if note["what"] in {"damaged", "collision"} and note.get("harmed") is not False
+        for accident in there_at(note, heard)
+        # The one right before it is whole.
+        if accident.good and max(accident.seconds, accident.ends - 2e-4) > at(note) - 1e-4
+    )
+
+
+def _tells(accident: Frame, moment: Moment, heard: list[Frame]) -> bool:
+    """Tell whether what came by accident can be behind it: of its ID; values of its board, that still count."""
+    if moment.rule != "contradiction":
+        return moment.place.data_id in {None, accident.data_id}
+    told_from = accident.address == moment.place.board and accident.data_id in SAID_BY[moment.place.detail]
+    return told_from and _held(accident, moment.seconds, heard)
+
+
+def _held(accident: Frame, seconds: float, heard: list[Frame]) -> bool:
+    """Tell whether what came by accident counts at that time: no newer reply of its ID, or table, is there by then."""
+    mine = [frame for frame in heard if frame.address == accident.address and frame.seconds < seconds + 1e-6]
+    if accident.data_id not in SLOTS:
+        return not any(frame.data_id == accident.data_id and frame.seconds > accident.seconds + 1e-6 for frame in mine)
+    whole = [table for table in tables(mine, accident.data_id) if table.whole > accident.seconds - 1e-6]
+    return len(whole) == 1 and whole[0].begins < accident.seconds + 1e-6
+
+
+def _harmed(moment: Moment, notes: list[Note]) -> bool:
+    """Tell whether bytes of that exchange were harmed, though a good frame of it is among what was heard.
+
+    The boards heard no good request, or on CAN the whole of it is an error frame.
+    """
+    return any(
+        note["what"] in {"damaged", "collision"}
+        and note.get("harmed") is not False
+        and _begins(bytes.fromhex(str(note.get("sent", note["heard"]))), moment.place.data_id)
+        for note in during(notes, moment.seconds - 1e-3, moment.seconds + WAITS_S)
+    )
+
+
+def _begins(data: bytes, data_id: int | None) -> bool:
+    """Tell whether an A5 frame of that ID begins in these bytes."""
+    return any(data[place] == 0xA5 and data[place + 2] == data_id for place in range(len(data) - 2))
+
+
+def _denied(moment: Moment, notes: list[Note]) -> bool:
+    """Tell whether it is a write to D2, or its answer with another value: nothing tells one from the other."""
+    return any(
+        (note["what"], note.get("dialect"), note.get("result")) == ("write", "d2", "denied")
+        and note.get("register") == moment.place.register
+        for note in during(notes, moment.seconds - LONGEST_S, moment.seconds + 1e-3)
+    )
+
+
+def _newer_is_answered(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether its reply is given to a newer request for its ID, which a busy board did not hear (records.md 7)."""
+    data_id, seconds = moment.place.data_id, moment.seconds
+    if data_id is None:
+        return False
+    given = answers(heard, data_id, seconds, seconds + WAITS_S)
+    unheard = {at(note) for note in during(notes, seconds, seconds + WAITS_S) if _not_heard(note, data_id)}
+    return not any(abs(request.seconds - seconds) < 1e-6 for request in given) and any(
+        abs(request.seconds - time) < 1e-6 for request in given for time in unheard
+    )
+
+
+def _not_heard(note: Note, data_id: int) -> bool:
+    return note["what"] == "unanswered" and note.get("why") == "busy" and note.get("data_id") == data_id
+
+
+def _behind_zeros(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it is the board's next reply behind zeros of waking up, or the one behind that, and so on."""
+    mine = [frame for frame in heard if frame.address == moment.place.board and frame.seconds < moment.seconds + 1e-6]
+    if not mine or not _zeros(mine[-1]):
+        return False
+    for frame in reversed(mine[:-1]):
+        if not _zeros(frame):
+            return False
+        if any(_woke(note, frame) for note in during(notes, frame.seconds - 1e-3, frame.seconds + 1e-3)):
+            return True
+    return False
+
+
+def _woke(note: Note, frame: Frame) -> bool:
+    return note["what"] == "zero_reply" and (note["board"], note["data_id"]) == (frame.address, frame.data_id)
+
+
+def _zeros(frame: Frame) -> bool:
+    """Tell whether a reply says nothing but zeros, but for the number of a frame of cells or sensors."""
+    return not any(frame.payload[1:] if frame.data_id in SLOTS else frame.payload)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What explains a finding that nobody put in, and what does not: frames by hand."""
+
+from __future__ import annotations
+
+from tests.tools.dalytools.findings.explained import explained
+from tests.tools.dalytools.findings.heard import Frame
+from tests.tools.dalytools.findings.moments import Moment
+
+from dalytools.findings.finding import Severity
+from dalytools.findings.place import Place
+
+
+def heard(seconds: float, address: int, data_id: int, payload: str = "") -> Frame:
+    return Frame(seconds, 13, address, data_id, bytes.fromhex(payload.ljust(16, "0")))
+
+
+def counted(rule: str, seconds: float, board: int = 1, data_id: int | None = None, detail: str = "") -> Moment:
+    return Moment(rule, Place(board=board, data_id=data_id, detail=detail), Severity.WARNING, seconds)
+
+
+def test_damage_explains_only_where_it_is_a_good_frame() -> None:
+    note = {"what": "damaged", "time": 1.5}
+    assert explained(counted("late", 2.0, board=1), [heard(1.5, 1, 0x90)], [note], 1.5)
+    assert not explained(counted("late", 2.0, board=1), [Frame(1.5, 13), heard(1.9, 1, 0x90)], [note], 1.5)
+    before = heard(1.5 - 13 / 960 + 1e-6, 1, 0x90)
+    assert not explained(counted("late", 2.0, board=1), [before, Frame(1.5, 13)], [note], 1.5)
+
+
+def test_cells_that_came_by_accident_explain_until_there_is_a_newer_table() -> None:
+    note = {"what": "damaged", "time": 2.0136}
+    count, first, accident = heard(1, 1, 0x94, "0601"), heard(2, 1, 0x95, "010ce4"), heard(2.0136, 1, 0x95, "02ffff")
+    part, rest = heard(3, 1, 0x95, "010ce4"), heard(3.0136, 1, 0x95, "020ce4")
+    told = [count, first, accident, heard(2.5, 1, 0x96, "01"), part]
+
+    def tells(frames: list[Frame], detail: str, board: int = 1) -> bool:
+        says = [heard(4, 1, 0x91, "0d0d"), heard(4, 1, 0x92, "3c")]
+        return explained(counted("contradiction", 4.0, board=board, detail=detail), [*frames, *says], [note], 11.0)
+
+    assert tells(told, "cell_max")
+    assert tells(told, "pack_voltage")
+    assert not tells(told, "temperature_max")
+    assert not tells(told, "cell_max", board=2)
+    assert not tells([*told, rest], "cell_max")
+    assert not tells([count, accident, part], "cell_max")  # in no table
+    assert not tells([count, accident, part, rest], "cell_max")
+
+
+def test_an_echo_is_explained_by_the_same_request_of_another_host() -> None:
+    note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x43, "data_id": 0x90}
+    both = [heard(1.0, 0x43, 0x90), heard(1.03, 0x43, 0x90)]
+    assert explained(counted("echo", 1.03, board=4), both, [note], 1.5)
+    assert not explained(counted("echo", 1.03, board=4), both[1:], [note], 1.5)
+    assert not explained(counted("echo", 1.03, board=4), both, [{**note, "why": "silent"}], 1.5)
+
+
+def test_an_unanswered_request_is_explained_by_a_newer_one_that_took_its_reply() -> None:
+    older, newer, reply = heard(1.0, 0x40, 0x90), heard(1.03, 0x20, 0x90), heard(1.08, 1, 0x90)
+    note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x20, "data_id": 0x90}
+    says = counted("unanswered", 1.0, data_id=0x90)
+    assert explained(says, [older, newer, reply], [note], 1.5)
+    assert not explained(says, [older, newer], [note], 1.5)
+    assert not explained(says, [older, newer, reply, heard(1.1, 1, 0x90)], [note], 1.5)
+    assert not explained(says, [older, newer, reply], [{**note, "why": "silent"}], 1.5)
+    assert not explained(counted("unanswered", 1.0, data_id=0x93), [older, newer, reply], [note], 1.5)
+
+
+def test_an_unanswered_request_is_explained_by_harm_to_its_exchange() -> None:
+    asked, harmed = heard(1.0, 0x40, 0x90), "ff" + "a501900800c600007530018100"
+    note = {"what": "damaged", "time": 1.05, "sent": harmed, "heard": harmed}
+    says = counted("unanswered", 1.0, data_id=0x90)
+    assert explained(says, [asked, Frame(1.05, 14)], [note], 1.5)
+    assert not explained(says, [asked, Frame(1.05, 14)], [{**note, "time": 0.9}], 1.5)
+    assert not explained(says, [asked, Frame(1.05, 14)], [{**note, "sent": harmed.replace("90", "93")}], 1.5)
+    assert not explained(says, [asked, Frame(1.05, 14)], [{**note, "harmed": False}], 1.5)
+    assert not explained(counted("late", 1.0, data_id=0x90), [asked, Frame(1.05, 14)], [note], 1.5)
+
+
+def test_a_write_to_d2_with_another_answer_is_two_requests() -> None:
+    note = {"what": "write", "time": 1.0, "dialect": "d2", "register": 0xA5, "result": "denied"}
+    says = Moment("unanswered", Place(address=0xD2, register=0xA5), Severity.WARNING, 1.1)
+    assert explained(says, [], [note], 1.5)
+    assert not explained(says._replace(seconds=1.4), [], [note], 1.5)
+    assert not explained(says, [], [{**note, "result": "none"}], 1.5)
+    assert not explained(says, [], [{**note, "register": 0xA6}], 1.5)
+
+
+def test_zeros_right_behind_zeros_of_waking_up_are_not_told_from_them() -> None:
+    note = {"what": "zero_reply", "time": 1.0, "board": 1, "data_id": 0x98}
+    woke, other, true = heard(1.0, 1, 0x98), heard(1.2, 2, 0x90, "02"), heard(1.4, 1, 0xD8)
+    says = counted("zero-reply", 1.4)
+    assert explained(says, [woke, other, true], [note], 1.5)
+    assert explained(says, [woke, heard(1.2, 1, 0x95, "01"), true], [note], 1.5)
+    assert not explained(says, [woke, heard(1.2, 1, 0x90, "02"), true], [note], 1.5)
+    assert not explained(says, [woke, true], [{**note, "board": 2}], 1.5)
+    assert not explained(says, [woke, heard(1.4, 1, 0xD8, "01")], [note], 1.5)
+    assert not explained(says, [true], [note], 1.5)
