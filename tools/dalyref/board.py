@@ -35,7 +35,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What the board was doing, by its newest 93 and 90; None where there was none."""
+    """What the board was doing, by its newest 93 and 90 that were not all zeros; None where there was none."""
 
     state: int | None
     current: int | None
@@ -81,6 +81,9 @@ class Board:
     cells_from: int = 0
     sensors_from: int = 0
     state: int | None = None
+    counted_from_0: set[int] = field(default_factory=set[int])
+    """Data IDs of bursts that had a frame number 0."""
+    _load_state: int | None = None
     _current: int | None = None
     _faults: tuple[int, int] | None = None  # bits, packet
     _mos: tuple[bytes, int] | None = None
@@ -102,7 +105,8 @@ class Board:
             case 0x90:
                 if self.state is not None:
                     fields["daly.pack.state"] = self.state
-                self._current = int.from_bytes(data[4:6])
+                if any(data):
+                    self._current = int.from_bytes(data[4:6])
                 self._pack = Total(seen, self._load(), int.from_bytes(data[:2]))
                 if self._near(seen, self._sum):
                     self._report(fields, self._compare_sums(self._pack, cast("Total", self._sum), at=self._sum))
@@ -150,7 +154,7 @@ class Board:
             self._report(fields, self._compare_heat(mine, reported, reported=reported))
 
     def _load(self) -> Load:
-        return Load(self.state, self._current)
+        return Load(self._load_state, self._current)
 
     def _near(self, seen: Seen, other: Total | Extremes | None) -> bool:
         return other is not None and seen.start_ns - other.seen.end_ns <= self._age_ns
@@ -206,6 +210,8 @@ class Board:
             names += ["discharge_mos"] * (bool(data[2]) != bool(before[2]))
             self._changed(fields, names, since)
         self.state = data[0]
+        if any(data):
+            self._load_state = data[0]
         self._mos = (data, seen.number)
 
     def _take_status(self, seen: Seen, data: bytes, fields: Fields) -> None:

@@ -148,16 +148,17 @@ class Bus:
         burst = self._burst
         if burst is not None and not burst.continues(data_id, message.route.address, located.start_ns, self._burst_ns):
             burst = None
-        if bursts.skipped(data_id, number, burst.base if burst is not None else 1):
-            parts.skip(data_id, content, slate)
-            return
         asked = self._asked.get(data_id, 0)
         if burst is not None and (number < burst.last or (number == burst.last and asked > burst.asked)):
             burst = None
+        base = self._base(located, message) if burst is None else burst.base
+        if bursts.skipped(data_id, number, base):
+            parts.skip(data_id, content, slate)
+            return
         if burst is None:
             self._end_burst()
             request = self._answer(located, message, slate)
-            burst = self._burst = self._begin(message, request, slate)
+            burst = self._burst = self._begin(message, base, request, slate)
         elif burst.request:
             fields["daly.request_in"] = burst.request
         burst.asked = asked
@@ -168,11 +169,20 @@ class Bus:
             else:
                 board.sensor_table(_seen(located), burst.slots(), fields)
 
-    def _begin(self, message: Message, request: int, slate: Slate) -> Burst[Slate]:
+    def _base(self, located: Located, message: Message) -> int:
+        """Return what the frames of a burst are counted from, given its first; remember of the board where it is 0."""
+        counted_from_0 = self._board(message.route.address).counted_from_0
+        if message.content[0] == 0:
+            counted_from_0.add(message.data_id)
+            return 0
+        lost = located.behind_damage and message.data_id in counted_from_0
+        return 0 if lost else 1
+
+    def _begin(self, message: Message, base: int, request: int, slate: Slate) -> Burst[Slate]:
         address, data_id = message.route.address, message.data_id
         board = self._board(address)
         count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
-        return Burst(data_id, address, 0 if message.content[0] == 0 else 1, count, request, slate)
+        return Burst(data_id, address, base, count, request, slate)
 
     def _end_burst(self, *, known: bool = True) -> None:
         """End the running burst. known: it is sure that it has ended, the capture does not merely stop."""

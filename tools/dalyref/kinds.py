@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 
 class Kind(StrEnum):
@@ -16,6 +17,10 @@ class Kind(StrEnum):
     JUNK = "junk"
     FOREIGN = "foreign"
     EVENT = "event"
+
+
+DAMAGED: Final = (Kind.BAD_CHECKSUM, Kind.SHORT, Kind.JUNK)
+"""Where frames may have been lost."""
 
 
 class Dialect(StrEnum):

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dalyref import bluetooth_module
-from dalyref.kinds import Kind, Record
+from dalyref.kinds import DAMAGED, Kind, Record
 from dalyref.records import Splitter
 
 if TYPE_CHECKING:
@@ -39,12 +39,24 @@ class Located:
     """When its last byte had ended."""
     held: bool = False
     """TCP: given up, because bytes behind it are lost or the capture ended."""
+    behind_damage: bool = False
+    """The record right before it in its stream, without those that were held, is damaged: a frame may be lost there."""
 
 
 class Stream:
     """All bytes of one interface, or connection, and one direction."""
 
-    __slots__ = ("_chunks", "_end_ns", "_length", "_options", "_quiet_ns", "_splitter", "_transport")
+    __slots__ = (
+        "_chunks",
+        "_damaged",
+        "_end_ns",
+        "_length",
+        "_options",
+        "_quiet_ns",
+        "_splitter",
+        "_text_at",
+        "_transport",
+    )
 
     def __init__(self, options: Options, transport: Transport = "uart") -> None:
         self._options = options
@@ -54,6 +66,8 @@ class Stream:
         self._chunks: deque[tuple[int, Packet]] = deque()  # (stream offset, packet) that a record may still begin in
         self._length = 0
         self._end_ns: int | None = None  # when the last byte had ended
+        self._damaged = False  # the last record is
+        self._text_at: int | None = None  # offset of the record to come that stands behind a Bluetooth module's text
 
     @property
     def waits_from(self) -> int | None:
@@ -84,6 +98,7 @@ class Stream:
             self._splitter.event()
             text = Record(self._length, packet.data, Kind.FOREIGN, foreign=bluetooth_module.NAME)
             out.append(Located(text, packet, packet.time_ns, packet.time_ns))
+            self._text_at = self._length  # junk before it may not be located yet
             return out
         self._chunks.append((self._length, packet))
         self._length += len(packet.data)
@@ -105,13 +120,17 @@ class Stream:
         """Take note of `count` bytes, whole frames up to `end_ns`, that were cut elsewhere while nothing was held."""
         self._length += count
         self._end_ns = end_ns
+        self._damaged = False
         self._splitter.passed(count)
 
     def flush(self) -> list[Located]:
         """Silence or the end: return what is held."""
+        damaged = self._damaged
         located = self._locate(self._splitter.flush())
-        for item in located:
-            item.held = self._transport == "tcp"
+        if self._transport == "tcp":
+            self._damaged = damaged
+            for item in located:
+                item.held = True
         return located
 
     def _lasts_ns(self, count: int) -> int:
@@ -129,7 +148,11 @@ class Stream:
             while offset + len(packet.data) < end:
                 chunks.popleft()
                 offset, packet = chunks[0]
-            out.append(Located(record, packet, start_ns, packet.time_ns + time(end - offset)))
+            end_ns = packet.time_ns + time(end - offset)
+            if self._text_at is not None and record.start >= self._text_at:
+                self._damaged, self._text_at = False, None
+            out.append(Located(record, packet, start_ns, end_ns, behind_damage=self._damaged))
+            self._damaged = record.kind in DAMAGED
             if offset + len(packet.data) == end:
                 chunks.popleft()
         return out

@@ -37,6 +37,8 @@ class BusFrames:
     """1 request, 2 reply, 3 echo; of those not looked at yet 1 or 2."""
     answers: Flags
     """Of replies: it begins an answer (a frame further on in its burst does not)."""
+    behind_damage: Flags
+    """The record right before it in its stream is damaged."""
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -57,6 +59,7 @@ class BusFrames:
             part_of(self.words, which),
             self.direction[which],
             self.answers[which],
+            self.behind_damage[which],
         )
 
     def behind(self, earlier: BusFrames) -> BusFrames:
@@ -72,6 +75,7 @@ class BusFrames:
             np.concatenate((earlier.words, self.words)),
             np.concatenate((earlier.direction, self.direction)),
             np.concatenate((earlier.answers, self.answers)),
+            np.concatenate((earlier.behind_damage, self.behind_damage)),
         )
 
     def bytes_of(self, at: int) -> bytes:

@@ -22,7 +22,7 @@ from dalyref.message import from_serial
 from dalytools.bulk.bus_frames import BOARD, IS_BURST, ONLY, part_of, risen
 from dalytools.bulk.frames import FIVE
 from dalytools.bulk.packets import SIDES
-from dalytools.bulk.runs import Running, judge
+from dalytools.bulk.runs import CountedFrom0, Running, judge
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
@@ -44,10 +44,10 @@ class Directions:
         self._echo_ns = options.limit_ns(options.echo)
         self._burst_ns = options.limit_ns(options.burst)
 
-    def find(self, before: BusFrames, frames: BusFrames, running: Running) -> None:
+    def find(self, before: BusFrames, frames: BusFrames, running: Running, from_0: CountedFrom0) -> None:
         """Set `direction` of frames, given those before them.
 
-        running: the reply before the frames.
+        running: the reply before the frames. from_0: whose bursts were counted from 0 before them.
         """
         doubtful, same = self._same_again(before, frames)
         if not len(doubtful):
@@ -58,7 +58,7 @@ class Directions:
         both.direction[doubtful] = np.where(verdict == ECHO, ECHO, REQUEST)
         open_questions = doubtful[verdict == _UNKNOWN]
         if len(open_questions):
-            self._by_the_book(both, known, open_questions, running)
+            self._by_the_book(both, known, open_questions, running, from_0)
         frames.direction = both.direction[known:]
 
     def _same_again(self, before_them: BusFrames, frames: BusFrames) -> tuple[Ints, Ints]:
@@ -137,10 +137,12 @@ class Directions:
             out[in_burst] = np.where(this < known, frames.answers[this], sure | (number[this] == 0))
         return out
 
-    def _by_the_book(self, frames: BusFrames, known: int, open_questions: Ints, running: Running) -> None:
+    def _by_the_book(
+        self, frames: BusFrames, known: int, open_questions: Ints, running: Running, from_0: CountedFrom0
+    ) -> None:
         """Ask the plain decoder's book of requests, from the frames of the time before on."""
         fresh = frames.part(slice(known, None))
-        judged = judge(fresh, running, self._burst_ns)
+        judged = judge(fresh, running, from_0, self._burst_ns)
         answers = frames.answers.copy()
         answers[known:] = False
         answers[known + judged.at[judged.begins]] = True
@@ -148,7 +150,7 @@ class Directions:
         ends = risen(frames.end_ns, 0)
         begin = int(np.searchsorted(ends, int(frames.latest_ns[first]) - self._wait_ns))
         book = Exchange[None](self._options)
-        follow = _Follow(fresh, running, first - known, self._burst_ns)
+        follow = _Follow(fresh, running, from_0, first - known, self._burst_ns)
         asked: set[bytes] = set()
         unknown = set(open_questions.tolist())
         for at in range(min(begin, first), last + 1):
@@ -185,13 +187,15 @@ def _skippable(frames: BusFrames, at: Ints) -> Flags:
 class _Follow:
     """Follows the bursts one by one, where echoes are only being found out."""
 
-    def __init__(self, frames: BusFrames, running: Running, place: int, burst_ns: int) -> None:
+    def __init__(self, frames: BusFrames, running: Running, from_0: CountedFrom0, place: int, burst_ns: int) -> None:
         self._frames = frames
         self._burst_ns = burst_ns
         before = frames.part(slice(0, place))
         self._data_id, self._address, self._number = running.data_id, running.address, running.number
         self._end_ns, self._asked, self._base = running.end_ns, bool(running.asked), running.base
-        runs = judge(before, running, burst_ns)
+        runs = judge(before, running, from_0, burst_ns)
+        self._from_0 = CountedFrom0(set(from_0.keys))
+        self._from_0.take(runs)
         if len(runs.at):
             last = int(runs.at[-1])
             self._note(last, int(runs.number[-1]), int(runs.base[-1]))
@@ -215,11 +219,16 @@ class _Follow:
         if not IS_BURST[data[2]]:
             self._note(at, -1, 1)
             return True
-        number = data[4]
+        key, number = (data[2], data[1]), data[4]
         near = int(self._frames.start_ns[at]) - self._end_ns <= self._burst_ns
-        goes_on = (data[2], data[1]) == (self._data_id, self._address) and near
-        if bursts.skipped(data[2], number, self._base if goes_on else 1):
+        begins = not near or key != (self._data_id, self._address) or number < self._number
+        begins |= number == self._number and self._asked
+        base = self._base
+        if begins:
+            base = 0 if number == 0 or (self._frames.behind_damage[at] and key in self._from_0.keys) else 1
+        if bursts.skipped(data[2], number, base):
             return False
-        begins = not goes_on or number < self._number or (number == self._number and self._asked)
-        self._note(at, number, (0 if number == 0 else 1) if begins else self._base)
+        if number == 0:
+            self._from_0.keys.add(key)
+        self._note(at, number, base)
         return begins

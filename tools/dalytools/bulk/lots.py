@@ -16,12 +16,13 @@ from dalyref.kinds import Dialect
 from dalytools.bulk import payloads, runs, tables
 from dalytools.bulk.bus_frames import BOARD, BusFrames, first_direction, part_of, risen, rows_of
 from dalytools.bulk.columns import Column, Table
+from dalytools.bulk.damage import Damage
 from dalytools.bulk.directions import Directions
 from dalytools.bulk.equal import all_equal
 from dalytools.bulk.modbus import Modbus
 from dalytools.bulk.newest import Newest
 from dalytools.bulk.records import DIALECTS, FRAME
-from dalytools.bulk.runs import Running
+from dalytools.bulk.runs import CountedFrom0, Running
 from dalytools.bulk.unlike import UnlikeError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from dalyref.options import Options
     from dalyref.values import Fields
-    from dalytools.bulk.arrays import Bytes, Ints, Shorts
+    from dalytools.bulk.arrays import Bytes, Flags, Ints, Shorts
     from dalytools.bulk.packets import Interfaces
     from dalytools.bulk.records import Records
 
@@ -75,6 +76,8 @@ class _Lot:
     found: tables.Found
     now_ns: Ints
     """The latest beginning of a record of any bus, by record."""
+    behind_damage: Flags
+    """By record: the one right before it in its stream is damaged."""
     count: Shorts
     """By record: of 95 and 96 the number of cells or sensors (0: not known), of 90 the state beside it (-1: none)."""
     base: Shorts
@@ -88,6 +91,7 @@ class _Bus:
     directions: Directions
     modbus: Modbus
     running: Running = field(default_factory=Running)
+    from_0: CountedFrom0 = field(default_factory=CountedFrom0)
     before: BusFrames | None = None
     """Frames that a request still to come may be an echo of, or follow."""
     latest_ns: int = 0
@@ -111,6 +115,7 @@ class Decoder:
         self._buses: dict[int | str, _Bus] = {}
         self._bus_of: list[_Bus] = []  # by interface
         self._now_ns = 0
+        self._damage = Damage()
         self._rows = 0  # records so far
         self._pace = _Pace()
 
@@ -144,7 +149,8 @@ class Decoder:
         now_ns = risen(records.time_ns, self._now_ns)
         self._now_ns = int(now_ns[-1])
         self._pace.check(now_ns)
-        lot = _Lot(batch, found, now_ns, np.zeros(count, np.int16), np.full(count, -1, np.int16))
+        behind_damage = self._damage.behind(records)
+        lot = _Lot(batch, found, now_ns, behind_damage, np.zeros(count, np.int16), np.full(count, -1, np.int16))
         for bus, rows in self._by_bus(records):
             self._of_bus(bus, rows, lot)
         self._rows += count
@@ -209,13 +215,15 @@ class Decoder:
             words,
             first_direction(address),
             np.zeros(len(rows), np.bool_),
+            lot.behind_damage[here],
         )
         if not len(frames):
             return
         bus.latest_ns = max(bus.latest_ns, int(latest_ns[-1]))
         before = bus.before if bus.before is not None else frames.part(slice(0, 0))
-        bus.directions.find(before, frames, bus.running)
-        judged = runs.judge(frames, bus.running, self._burst_ns)
+        bus.directions.find(before, frames, bus.running, bus.from_0)
+        judged = runs.judge(frames, bus.running, bus.from_0, self._burst_ns)
+        bus.from_0.take(judged)
         clock = runs.Clock(bus_now_ns, now_ns, self._burst_ns)
         runs.check(frames, judged, bus.running, clock, self._rows)
         frames.answers[judged.at] = judged.begins

@@ -79,8 +79,22 @@ class Runs:
     """What the numbers of its burst are counted from: 0 or 1."""
 
 
-def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
-    """Tell what goes on with what. frames: their directions are known.
+@dataclass(slots=True)
+class CountedFrom0:
+    """Whose bursts had a frame number 0 on a bus so far (docs/records.md, 8: the base)."""
+
+    keys: set[tuple[int, int]] = field(default_factory=set[tuple[int, int]])
+    """Data ID and address byte."""
+
+    def take(self, runs: Runs) -> None:
+        """Note the frames of a lot."""
+        zeros = np.flatnonzero(runs.number == 0)
+        if len(zeros):
+            self.keys.update(zip(runs.data_id[zeros].tolist(), runs.address[zeros].tolist(), strict=True))
+
+
+def judge(frames: BusFrames, running: Running, from_0: CountedFrom0, burst_ns: int) -> Runs:
+    """Tell what goes on with what. frames: their directions are known. from_0: by the frames before them.
 
     Raises UnlikeError where that depends on more than neighbours.
     """
@@ -99,11 +113,11 @@ def judge(frames: BusFrames, running: Running, burst_ns: int) -> Runs:
     kept = _Kept(at, data_id, address, number)
     some_doubtful = doubtful.any()
     for _ in range(_MOST_ROUNDS):
-        runs = _judge_kept(frames, kept if keep.all() else kept.part(keep), running, burst_ns)
+        runs = _judge_kept(frames, kept if keep.all() else kept.part(keep), running, from_0, burst_ns)
         if not some_doubtful:
             return runs
         # In a burst with base 0 the highest number that its ID can have is one lower.
-        beyond = np.flatnonzero(doubtful[keep] & (runs.base == 0) & ~runs.begins)
+        beyond = np.flatnonzero(doubtful[keep] & (runs.base == 0))
         if not len(beyond):
             return runs
         _, one_a_run = np.unique(runs.first[beyond], return_index=True)
@@ -124,7 +138,7 @@ class _Kept:
         return _Kept(self.at[which], self.data_id[which], self.address[which], self.number[which])
 
 
-def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, burst_ns: int) -> Runs:
+def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, counted_from_0: CountedFrom0, burst_ns: int) -> Runs:
     at, data_id, address, number = kept.at, kept.data_id, kept.address, kept.number
     if not len(at):
         none, short = np.zeros(0, np.int64), np.zeros(0, np.int16)
@@ -151,14 +165,25 @@ def _judge_kept(frames: BusFrames, kept: _Kept, running: Running, burst_ns: int)
     head = int(begin[0]) if len(begin) else len(at)
     sizes = np.diff(begin, append=len(at))
     first = np.repeat(begin, sizes)
-    begins_with_0 = number[begin] == 0
-    base = (
-        np.repeat(1 - begins_with_0.astype(np.int16), sizes) if begins_with_0.any() else np.ones(len(first), np.int16)
-    )
+    from_0 = number[begin] == 0
+    if frames.behind_damage.any():
+        behind = np.flatnonzero(frames.behind_damage[at[begin]] & (number[begin] > 0))
+        from_0[behind] = _counted_from_0(kept, begin[behind], counted_from_0)
+    base = np.repeat(1 - from_0.astype(np.int16), sizes) if from_0.any() else np.ones(len(first), np.int16)
     if head:
         first = np.concatenate((np.full(head, -1), first))
         base = np.concatenate((np.full(head, running.base, np.int16), base))
     return Runs(at, data_id, address, begins, begin, number, first, base)
+
+
+def _counted_from_0(kept: _Kept, places: Ints, before: CountedFrom0) -> list[bool]:
+    """Tell of which places the data ID and address byte had number 0 earlier."""
+    zeros = np.flatnonzero(kept.number == 0)
+    since = dict.fromkeys(before.keys, -1)
+    for at, *key in zip(zeros.tolist(), kept.data_id[zeros].tolist(), kept.address[zeros].tolist(), strict=True):
+        since.setdefault((key[0], key[1]), at)
+    keys = zip(kept.data_id[places].tolist(), kept.address[places].tolist(), strict=True)
+    return [since.get(key, at) < at for at, key in zip(places.tolist(), keys, strict=True)]
 
 
 def _asked_between(frames: BusFrames, after: Ints, before: Ints, data_id: Bytes) -> Flags:

@@ -154,6 +154,35 @@ def test_echoes_that_neighbours_do_not_tell(tmp_path: Path) -> None:
     assert agree(path, 1, 100, 1 << 20) == len(rows)
 
 
+def test_a_burst_behind_damage_counts_from_0_where_its_board_did(tmp_path: Path) -> None:
+    """Docs/records.md, 8, the base, on two interfaces of one bus. Of five cells, number 1 has three, or two from 0."""
+    status = a5(1, 0x94, bytes((5, 1, 0, 0, 0, 0, 9, 0)))
+    bad, junk, event = part(0)[:-1] + b"\0", b"\x11\x22", b""
+    both = [
+        (status, event),
+        (bad, part(1)),  # 3 cells
+        (part(1), event),  # 3: behind damage, but no number 0 was seen
+        (part(0), part(1)),  # 3, 3
+        (junk, bad),
+        (ASK, part(1)),  # 2
+        (part(1), junk),  # 3: behind the request
+        (junk, event),
+        (event, part(1)),  # 2
+        (part(16), part(2)),  # none, for 16 is no number from 0; and 2
+        (part(1), event),  # 3: behind a good frame
+    ]
+    rows = [(0.6 * at, data) for at, data in enumerate(data for pair in both for data in pair)]
+    path = write_packets(tmp_path / "x.pcapng", rows, interfaces=("bus=one", "bus=one second tap"))
+
+    def cells(batches: Iterator[Batch]) -> list[object]:
+        tables = [batch.replies[0x95] for batch in batches if 0x95 in batch.replies]
+        return [table.columns["daly.cell.voltage"].value(row) for table in tables for row in range(len(table))]
+
+    expected = [3, 3, 3, 3, 2, 3, 2, 0, 2, 3]
+    assert cells(quick_only(path)) == [[3300] * count or None for count in expected]
+    assert agree(path, 1, 100, 1 << 20) == len(rows)
+
+
 def test_memory_is_bounded(tmp_path: Path) -> None:
     """Eight times the capture takes no more memory (numpy tells tracemalloc of its arrays)."""
 
