@@ -25,7 +25,7 @@ from dalycapture.create import open_writer
 from dalycapture.interface import Interface
 from dalytools.comparison import compare
 from dalytools.simulator.bus import traffic
-from dalytools.simulator.scenario import Board, Damage, Host, Pack, Scenario
+from dalytools.simulator.scenario import Board, Damage, Habits, Host, Pack, Scenario
 from dalytools.wires.choice import Choice, numbers
 
 if TYPE_CHECKING:
@@ -41,7 +41,11 @@ WIRES = Choice(tcp_ports=numbers(str(traffic_wires.PORT)), ble_handles=numbers(s
 def likely_bus(seed: int) -> Iterator[Made]:
     """A bus with three boards, damaged here and there, a packet a frame."""
     scenario = Scenario(
-        boards=(Board(1, pack=Pack(cells=16)), Board(2, pack=Pack(cells=14, sensors=8)), Board(3, pack=Pack(cells=48))),
+        boards=(
+            Board(1, pack=Pack(cells=16)),
+            Board(2, pack=Pack(cells=14, sensors=8), habits=Habits(frame_base=0)),
+            Board(3, pack=Pack(cells=48)),
+        ),
         host=Host(),
         damage=Damage(drop=0.0005, flip=0.0005, insert=0.0005, cut=0.002),
         seed=seed,

@@ -407,6 +407,37 @@ CASES: dict[str, list[Heard]] = {
         Heard(a5(1, 0x90, "00600000 753b 0200".replace(" ", "")), 0.5),
         Heard(extremes(3200, 3, 3300, 1), 0.6),
     ],
+    "zeros after wake-up tell no state and no current": [
+        Heard(status(3), 0),
+        Heard(a5(1, 0x93, "020101"), 0.1),
+        Heard(pack(99), 0.2),
+        Heard(THREE, 0.3, TABLE),
+        Heard(a5(1, 0x93), 0.4, {"changed": ["state", "charge_mos", "discharge_mos"], "changed_from": 2}),
+        Heard(extremes(3400, 3, 3300, 1), 0.5, {"contradiction": ["cell_max"], "contradicts": [4]}),
+        Heard(a5(1, 0x90), 0.6),
+        Heard(extremes(3400, 3, 3300, 1), 0.7, {"contradiction": ["cell_max"], "contradicts": [4]}),
+        Heard(pack(102), 0.8, {"contradiction": ["pack_voltage"], "contradicts": [4]}),
+    ],
+    "zeros before anything is known": [
+        Heard(status(3), 0),
+        Heard(a5(1, 0x93), 0.1),
+        Heard(a5(1, 0x90), 0.2),
+        Heard(THREE, 0.3, TABLE),
+        Heard(a5(1, 0x93, "020101"), 0.4, {"changed": ["state", "charge_mos", "discharge_mos"], "changed_from": 2}),
+        Heard(pack(102), 0.5, {"contradiction": ["pack_voltage"], "contradicts": [4]}),
+        Heard(extremes(3400, 3, 3300, 1), 0.6, {"contradiction": ["cell_max"], "contradicts": [4]}),
+    ],
+    "a state of 0 is one where not all is zero": [
+        Heard(status(3), 0),
+        Heard(a5(1, 0x93, "0201010000000001"), 0.1),
+        Heard(THREE, 0.2, TABLE),
+        Heard(
+            a5(1, 0x93, "0000000000000001"),
+            0.3,
+            {"changed": ["state", "charge_mos", "discharge_mos"], "changed_from": 2},
+        ),
+        Heard(extremes(3400, 3, 3300, 1), 0.4),
+    ],
     "temperatures": [
         Heard(status(3, 2), 0),
         Heard(

@@ -135,6 +135,20 @@ class Traffic:
             frames.append(a5(address, data_id, bytes((number & 0xFF,)) + cells + bytes((r.choice(BYTES),))))
         return frames
 
+    def _from_0(self) -> list[bytes]:
+        """A board that counts its frames from 0, asked again: damage or something else stands where number 0 was."""
+        r = self.r
+        address, data_id, count = r.choice((1, 1, 2)), r.choice((0x95, 0x95, 0x96, 0x57)), r.choice((1, 2, 5, 16))
+        asked = [a5(0x3F + address, data_id, bytes(8))] if r.random() < 0.7 else []
+        known, again = (
+            [a5(address, data_id, bytes((number,)) + r.randbytes(7)) for number in range(count)] for _ in range(2)
+        )
+        lost = r.choice((1, 1, 1, 2, count))
+        between = r.choice((b"", b"", b"", again[0], self._others(), a5(address, data_id, b"\xff" + bytes(7))))
+        following = again[lost:] or [a5(address, data_id, bytes((r.choice((1, 2, 3, 15, 16, 17)),)) + bytes(7))]
+        damaged = [self._damaged(frame) for frame in again[:lost]]
+        return [*r.choice((known, known, [])), *asked, *damaged, between, *following]
+
     def _texts(self) -> list[bytes]:
         r = self.r
         data_id = r.choice((0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
@@ -271,7 +285,7 @@ class Traffic:
         if style < 0.6:
             return b"".join(self._burst())
         if style < 0.68:
-            return b"".join(r.choice((self._texts, self._pack, self._pack, self._write))())
+            return b"".join(r.choice((self._texts, self._pack, self._pack, self._write, self._from_0))())
         if style < 0.78:
             return self._modbus()
         if style < 0.86:
