@@ -197,7 +197,7 @@ def test_outer_frame_waits_for_the_inner_one() -> None:
         (READ[:7] + b"\xff", [(JUNK, 8)]),  # whole, CRC wrong
         (b"\xd2\x03\x03", [(SHORT, 3)]),  # no reply (odd), but a request cut off
         (b"\x51\x03\x03", [(JUNK, 3)]),
-        (b"\x51\x03\xfc", [(JUNK, 3)]),
+        (b"\x51\x03\xfe", [(JUNK, 3)]),  # 254 bytes: above 252
         (b"\x51\x03\x04\x01\x02\x03", [(SHORT, 6)]),  # 9 bytes expected
         (b"\x51\x03\x02" + b"\x01" * 4, [(JUNK, 7)]),
         (b"\x51\x83", [(SHORT, 2)]),
