@@ -44,9 +44,12 @@ local function keep(board, name, packet, ends)
     board[name] = other
   end
   other.packet, other.ended = packet, ends
-  other.current, other.state = board.current, board.state
+  other.current, other.state = board.current, board.load_state
   return other
 end
+
+-- Replies after wake-up: a 0x90 or 0x93 of zeros tells nothing of the load.
+local ZEROS = ("\0"):rep(8)
 
 -- Voltages of two moments can be compared where the load was the same: 1 A is 10 of the raw current.
 local function same_load(mine, theirs)
@@ -142,7 +145,10 @@ local take = {} -- by ID; returns what the frame is shown with, or nil
 
 take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
   local high, low, _, _, more, less, soc_high, soc_low = byte(raw, 5, 12)
-  board.current = more * 256 + less
+  local current = more * 256 + less
+  if current ~= 0 or sub(raw, 5, 12) ~= ZEROS then
+    board.current = current
+  end
   local mine = keep(board, "pack", packet, ends)
   mine.raw, mine.soc = high * 256 + low, soc_high * 256 + soc_low
   local cells = board.all_cells
@@ -189,6 +195,9 @@ take[0x93] = function(bus, board, slot, packet, raw)
     end
   end
   board.state, board.charge, board.discharge, board.mos_in = state, charge, discharge, packet
+  if state ~= 0 or charge or discharge or sub(raw, 5, 12) ~= ZEROS then
+    board.load_state = state
+  end
 end
 
 take[0x94] = function(bus, board, slot, packet, raw)

@@ -105,9 +105,10 @@ local function link_parts(bus, burst, number)
   burst.parts = {}
 end
 
---- A reply that is one of several frames. Returns, each nil where there is none: packet of its request; response time,
--- or minus the packet of the burst's table; what it is shown with; the table.
-function M.feed(bus, slot, packet, raw, address, id, starts, ends)
+--- A reply that is one of several frames. `damaged`: what stands right before it in its stream is. Returns, each nil
+-- where there is none: packet of its request; response time, or minus the packet of the burst's table; what it is shown
+-- with; the table.
+function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   local state = bus.state
   local number = byte(raw, 5)
   local burst = state.burst
@@ -128,6 +129,15 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends)
     again = number == burst.number or nil
     from = burst.number + 1
   else
+    local base, kind = 1, id * 256 + address
+    if number == 0 then
+      base, state.from_zero[kind] = 0, true
+    elseif damaged and state.from_zero[kind] then
+      if number == highest and id >= 0x95 then
+        return nil
+      end
+      base = 0 -- number 0 may be what was damaged
+    end
     M.finish(bus)
     local request
     request, wait = exchange.answer(bus, slot, packet, raw, address, id, starts)
@@ -136,7 +146,7 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends)
     burst = {
       id = id,
       address = address,
-      base = number == 0 and 0 or 1,
+      base = base,
       request = request,
       count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil,
       per_frame = per_frame,

@@ -38,22 +38,32 @@ function M.new(times, results)
   local state = exchange.state()
   state.boards = {} -- by address byte of replies
   state.burst = nil -- the running one
+  state.from_zero = {} -- by data ID x 256 + address byte: a reply had number 0
   local bus = { times = times, results = results, state = state, mark = nil }
   results.buses[#results.buses + 1] = bus
   return bus
 end
 
 --- One frame, A5 or Modbus. `slot`: the frame's own number for the results; `number`: of its packet; `raw`: its bytes;
--- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from.
-function M.feed(bus, slot, number, raw, starts, ends, side, owner)
+-- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from;
+-- `damaged`: the record right before it in that stream is bad_checksum, short or junk.
+function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
   local first, address, id = byte(raw, 1, 3)
   local results, state = bus.results, bus.state
   local link, wait, memory = results.link, results.wait, results.memory
   local mark = bus.mark
   if mark then
     local log = mark.log
-    log[#log + 1] =
-      { slot = slot, number = number, raw = raw, starts = starts, ends = ends, side = side, owner = owner }
+    log[#log + 1] = {
+      slot = slot,
+      number = number,
+      raw = raw,
+      starts = starts,
+      ends = ends,
+      side = side,
+      owner = owner,
+      damaged = damaged,
+    }
     if #log > MOST_UNCERTAIN then
       bus.mark = nil
     end
@@ -89,7 +99,7 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner)
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
     link[slot], wait[slot], memory[slot] = request or false, waited or false, false
   elseif BURST_IDS[id] then
-    local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends)
+    local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
     link[slot], wait[slot], memory[slot] = request or false, waited or false, shown or false
     if values then
       boards.feed_table(bus, slot, number, values, address, id, starts, ends)

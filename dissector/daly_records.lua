@@ -185,6 +185,12 @@ function M.is_modules(buf, p)
   return fn == 0x10 and high == 0x0F and low == 0x05
 end
 
+--- Whether a record is damaged bytes, in which a frame may have been lost.
+function M.is_damage(record)
+  local kind = record.kind
+  return kind == "junk" or kind == "short" or kind == "bad_checksum"
+end
+
 --- A cutter for one stream.
 function M.new()
   return { buf = "", base = 1, scan = 1, cuts = {}, known = true, waiting = false }

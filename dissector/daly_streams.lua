@@ -145,6 +145,8 @@ function M.stream(capture, key, bus_name, side)
       ended = nil, -- when the last packet's last byte ended
       total = 0, -- bytes so far
       tentative = nil, -- items, by position, of frames that are fed but not certain
+      damaged_to = nil, -- position behind the newest damaged record, and of the newest record beside the stream
+      aside_at = nil,
     }
     capture.streams[key] = stream
   end
@@ -229,12 +231,14 @@ local function new_slot(capture)
 end
 
 local function feed(stream, frame)
-  bus_module.feed(stream.bus, frame.slot, frame.number, frame.raw, frame.starts, frame.ends, stream.side, stream)
+  local raw, starts, ends = frame.raw, frame.starts, frame.ends
+  feed_bus(stream.bus, frame.slot, frame.number, raw, starts, ends, stream.side, stream, frame.damaged)
 end
 
--- Lay out records; returns the frames among them, to be fed.
+-- Lay out records; returns the frames among them, to be fed, and the position behind the last damaged one.
 local function settle(capture, stream, found, list, held, held_base)
   local frames, byte_time = {}, capture.byte_time
+  local damaged_to = stream.damaged_to
   for i = 1, #found do
     local record = found[i]
     local item, from, to = lay_out(stream, record, list, held, held_base)
@@ -249,10 +253,13 @@ local function settle(capture, stream, found, list, held, held_base)
         starts = from.time + (record.first - from.first) * byte_time,
         ends = to.time + (record.last - to.first + 1) * byte_time,
         known = known ~= nil,
+        damaged = damaged_to == record.first and stream.aside_at ~= record.first,
       }
+    elseif records.is_damage(record) then
+      damaged_to = record.last + 1
     end
   end
-  return frames
+  return frames, damaged_to
 end
 
 -- Packets whose bytes are all settled are done.
@@ -273,12 +280,23 @@ local function drop_settled(stream)
   end
 end
 
+-- Tell the bus again what others told it, from others[from] to packet `until_packet`. Returns the next one's place.
+local function feed_again(bus, others, from, until_packet)
+  while others and others[from] and others[from].number < until_packet do
+    local o = others[from]
+    feed_bus(bus, o.slot, o.number, o.raw, o.starts, o.ends, o.side, o.owner, o.damaged)
+    from = from + 1
+  end
+  return from
+end
+
 -- Take what is certain after `data`, lay it out, and tell the bus. What is held shows provisionally.
 local function advance(capture, stream, data, final)
   local cutter = stream.cutter
   local held, held_base = cutter.buf .. data, cutter.base
   local found = records.take(cutter, data, final)
-  local frames = settle(capture, stream, found, "items", held, held_base)
+  local frames
+  frames, stream.damaged_to = settle(capture, stream, found, "items", held, held_base)
   local certain = #frames
   local uncertain = cutter.waiting and records.peek(cutter) or nil
   -- What was shown provisionally of bytes that are still held is shown anew.
@@ -334,7 +352,9 @@ local function advance(capture, stream, data, final)
     end
     stream.tentative = nil
   end
+  local next_other = 1
   for i = fed + 1, #frames do
+    next_other = feed_again(stream.bus, others, next_other, frames[i].number)
     if i == certain + 1 then
       bus_module.mark(stream.bus, stream)
     end
@@ -342,10 +362,7 @@ local function advance(capture, stream, data, final)
       feed(stream, frames[i])
     end
   end
-  for i = 1, others and #others or 0 do
-    local o = others[i]
-    bus_module.feed(stream.bus, o.slot, o.number, o.raw, o.starts, o.ends, o.side, o.owner)
-  end
+  feed_again(stream.bus, others, next_other, math.huge)
   if #frames > certain then
     local kept = { count = #frames - certain, order = {} }
     for i = certain + 1, #frames do
@@ -379,7 +396,9 @@ end
 --- Bytes that are a foreign record by themselves, and no part of the stream; they divide it as an event does.
 function M.aside(capture, stream, number, time, raw, name)
   capture.results.latest = math.max(capture.results.latest, time)
-  records.event(stream.cutter)
+  local cutter = stream.cutter
+  records.event(cutter)
+  stream.aside_at = cutter.base + #cutter.buf
   capture.plans[number] = { items = { { kind = "foreign", name = name, at = 0, length = #raw } } }
 end
 
@@ -404,8 +423,10 @@ function M.first(capture, stream, number, time, raw)
   local ends = time + length * byte_time
   stream.ended = ends
   if cutter.buf == "" and (length == 13 and is_clear_frame(raw) or is_one_modbus(raw, length)) then
-    feed_bus(stream.bus, number, number, raw, time, ends, stream.side, stream)
-    cutter.base = cutter.base + length
+    local base = cutter.base
+    local damaged = stream.damaged_to == base and stream.aside_at ~= base
+    feed_bus(stream.bus, number, number, raw, time, ends, stream.side, stream, damaged)
+    cutter.base = base + length
     return true
   end
   local first = cutter.base + #cutter.buf

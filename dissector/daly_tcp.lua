@@ -21,11 +21,12 @@ local stream_number, segment_length = Field.new("tcp.stream"), Field.new("tcp.le
 local capture -- options, buses by connection, results by slot (see daly_streams)
 local slots -- of frames, see feed()
 local held -- by bus and side: bytes that were undecided, and when they came; see begins()
+local damaged -- by bus and side: whether the newest record is damaged
 
 --- Begin a capture. `with`: see daly_streams.capture.
 function M.init(with)
   capture = streams.capture(with)
-  slots, held = {}, {}
+  slots, held, damaged = {}, {}, {}
 end
 
 -- The bus of the connection, the same for both directions, and which end sent this packet. Wireshark numbers them,
@@ -102,10 +103,12 @@ end
 local function feed(items, raw, left, pinfo)
   local number, results = pinfo.number, capture.results
   results.latest = math.max(results.latest, pinfo.rel_ts)
-  local bus, side, times
+  local bus, side, times, behind
   if not pinfo.visited then
     bus, side = bus_of(pinfo)
     times = begins(bus, side, raw, left, pinfo.rel_ts)
+    damaged[bus] = damaged[bus] or {}
+    behind = damaged[bus][side]
   end
   local seen = {}
   for i = 1, #items do
@@ -121,10 +124,14 @@ local function feed(items, raw, left, pinfo)
         while times[began + 1] and times[began + 1].at <= item.at do
           began = began + 1
         end
-        bus_module.feed(bus, slots[key], number, bytes, times[began].time, pinfo.rel_ts, side, capture)
+        bus_module.feed(bus, slots[key], number, bytes, times[began].time, pinfo.rel_ts, side, capture, behind)
       end
       item.slot = slots[key] or 0
     end
+    behind = records.is_damage(item)
+  end
+  if bus then
+    damaged[bus][side] = behind
   end
 end
 
