@@ -2,7 +2,7 @@
 """The debug log of ``dalybms`` (dreadnought/python-daly-bms): ``daly-bms-cli --verbose``, or a program that uses it.
 
     DEBUG    [daly_bms.py:100] -- 90 ------------------------
-    DEBUG    [daly_bms.py:70] w a54090080000000000000000 7d          written (no blank before the checksum)
+    DEBUG    [daly_bms.py:70] w a540900800000000000000007d           written
     DEBUG    [daly_bms.py:119] 0 a50190080215000075300271c4 13       read: place, bytes, how many
 
 Its own format has no times; a program's may have them in front. Times are those of the line's printing, behind the last

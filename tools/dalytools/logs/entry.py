@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 if TYPE_CHECKING:
     from dalyref.packet import Direction
 
 OUT: Direction = "outbound"
 IN: Direction = "inbound"
+DAY_NS: Final = 86400 * 10**9
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +29,9 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Some bytes of a log. direction: outbound is what a host sent; can_id: of a CAN frame (29 bits: above 7FF)."""
+    """Some bytes of a log. direction: outbound is what a host sent; can_id: of a CAN frame (29 bits:
+    above 7FF, or with SocketCAN's flags).
+    """
 
     data: bytes
     stamp: Stamp | None = None
@@ -48,6 +51,10 @@ class LineLog(Protocol):
     stamped_at_end: bool
     gaps: bool
 
+    def look(self, lines: list[str]) -> None:
+        """Look at the first lines of the log, before they are read."""
+        ...
+
     def parse(self, line: str) -> list[Entry] | None:
         """Read a line: its bytes, if any; None where it is not understood."""
         ...
@@ -64,6 +71,9 @@ class PlainLineLog:
     about = ""
     stamped_at_end = False
     gaps = True
+
+    def look(self, lines: list[str]) -> None:
+        """Nothing depends on it."""
 
     def finish(self) -> list[Entry]:
         """Nothing waits."""

@@ -9,13 +9,16 @@ is a new message. Where it has times that are too coarse, bytes that would overl
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 from dalycapture.captured import CapturedPacket
 from dalycapture.interface import Interface, tap
 from dalycapture.linktype import DEFAULT_LINK_TYPE
 from dalycapture.pcapng import INBOUND, OUTBOUND, SYMBOL_ERROR
+from dalytools.logs.entry import DAY_NS
 from dalytools.logs.kinds import KINDS, RAW
 from dalytools.logs.sigrok import Sigrok
 from dalytools.logs.text_lines import PIECE, text_lines
@@ -28,15 +31,16 @@ if TYPE_CHECKING:
     from dalytools.logs.entry import Entry, LineLog, Stamp
 
 SOCKETCAN: Final = 227
-DAY_NS: Final = 86400 * 10**9
 GAP_NS: Final = 120_000_000  # between lines without times: an echo comes sooner, a burst ends later
 FINE_NS: Final = 1000  # times as fine as this are a logic analyser's: taken as they are
 OVERLAP_NS: Final = 5 * 10**9  # bytes are moved by so much at most; more is a clock that was set
 NO_TIMES: Final = "imported: the log has no times, its bytes are laid out from 1970 on"
 _STANDARD_MOST: Final = 0x7FF
+_EXTENDED_MOST: Final = 0x1FFF_FFFF
 _EXTENDED: Final = 0x8000_0000
 _FLAGS: Final = {"": 0, "inbound": INBOUND, "outbound": OUTBOUND}
 _RAW_PIECE: Final = 4096
+LOOKED_AT: Final = 400  # lines
 
 
 @dataclass(slots=True)
@@ -82,6 +86,8 @@ class Importer:
         log: LineLog = (
             Sigrok(self._options.baud, self._samplerate) if self._kind == Sigrok.name else KINDS[self._kind]()
         )
+        start = start or stream.read(PIECE)
+        log.look(list(islice(text_lines(io.BytesIO(), start), LOOKED_AT)))
         for line in text_lines(stream, start):
             self.tally.lines += 1
             if not line.strip():
@@ -130,7 +136,7 @@ class Importer:
             tally.bytes += len(entry.data)
             tally.directions.add(entry.direction)
             if entry.can_id is not None:
-                identifier = entry.can_id | (_EXTENDED if entry.can_id > _STANDARD_MOST else 0)
+                identifier = entry.can_id | (_EXTENDED if _STANDARD_MOST < entry.can_id <= _EXTENDED_MOST else 0)
                 data = identifier.to_bytes(4) + bytes((len(entry.data), 0, 0, 0)) + entry.data
                 yield from self._packet(data, at, link_type=SOCKETCAN)
             else:

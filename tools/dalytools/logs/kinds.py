@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from dalytools.logs.candump import CanDump
 from dalytools.logs.comtool import ComTool
 from dalytools.logs.dalybms import DalyBms
 from dalytools.logs.docklight import Docklight
@@ -27,7 +28,19 @@ RAW_ABOUT: Final = "the bytes of a port, one after the other, no times"
 
 KINDS: Final[dict[str, Callable[[], LineLog]]] = {
     kind.name: kind
-    for kind in (EspHome, NrfConnect, SerialBattery, DalyBms, Saleae, Sigrok, ComTool, Docklight, HexDump, HexLines)
+    for kind in (
+        EspHome,
+        CanDump,
+        NrfConnect,
+        SerialBattery,
+        DalyBms,
+        Saleae,
+        Sigrok,
+        ComTool,
+        Docklight,
+        HexDump,
+        HexLines,
+    )
 }
 """Those that are most particular first: of two that understand a log as well, the first is it."""
 
@@ -47,6 +60,7 @@ def guess(lines: list[str]) -> Guess | None:
     best_score = 0
     for name, made in KINDS.items():
         log = made()
+        log.look(lines)
         found = fit = 0
         for line in lines:
             entries = log.parse(line)

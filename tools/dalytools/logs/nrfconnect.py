@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dalytools.logs.entry import IN, OUT, Entry, PlainLineLog
+from dalytools.logs.entry import DAY_NS, IN, OUT, Entry, PlainLineLog
 from dalytools.logs.hexbytes import hex_bytes
 from dalytools.logs.stamps import split_stamp
 
@@ -37,6 +37,7 @@ class NrfConnect(PlainLineLog):
 
     def __init__(self) -> None:
         self._day_ns = 0
+        self._clock_ns = 0  # the newest time of day
         self._headed = False
 
     def parse(self, line: str) -> list[Entry] | None:
@@ -45,11 +46,14 @@ class NrfConnect(PlainLineLog):
         if head:
             self._headed = True
             stamp, _ = split_stamp(f"{head[1]} 00:00:00") if head[1] else (None, "")
-            self._day_ns = stamp.ns if stamp else 0
+            self._day_ns, self._clock_ns = stamp.ns if stamp else 0, 0
             return []
         level = _LEVEL.match(line)
         stamp, rest = split_stamp(line[level.end() :] if level else line)
         if stamp is not None and stamp.what == "day" and self._day_ns:
+            if stamp.ns < self._clock_ns - DAY_NS // 2:  # past midnight
+                self._day_ns += DAY_NS
+            self._clock_ns = stamp.ns
             stamp = replace(stamp, what="moment", ns=self._day_ns + stamp.ns)
         found = _VALUE.fullmatch(rest.strip()) or _IOS.fullmatch(rest.strip())
         if found:

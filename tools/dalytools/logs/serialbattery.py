@@ -5,8 +5,9 @@ r"""The debug log of dbus-serialbattery (Louisvdw's, mr-manuel's) on Venus OS.
     @4000000067d8.. INFO:SerialBattery:reply: a50190080215000075300271c4
 
 Frames of CAN become frames of CAN. The driver changes the identifiers of bursts before it logs them (field notes c.1):
-0x18A64001 was 0x18954001, with frame number 1 in the data; that is undone. Every other line of the driver is known and
-left out. Sources: logs in mr-manuel/venus-os_dbus-serialbattery 212 and 249; the driver's read_sentence.
+0x18A64001 was 0x18954001, with frame number 1 in the data; that is undone. A line of the driver without bytes
+is known and left out. Sources: logs in mr-manuel/venus-os_dbus-serialbattery 212 and 249; the driver's
+read_sentence.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ _CAN = re.compile(r".{0,60}?(?:Received|Sent|Send)[^=]{0,20}ID=0x([0-9A-Fa-f]{1,
 _HEX = re.compile(
     r".{0,80}?(?P<what>reply|request|command|sent|received|Sending|Receiving)[^:=]{0,20}[:=] ?(?P<rest>.*)", re.I
 )
+_BYTES = re.compile(r"(?:(?:0x|\\x)?[0-9A-Fa-f]{2}[ ,:]{0,2}){8}|bytearray\(")  # of which nobody told what they are
 _LINE = re.compile(r"(?:DEBUG|INFO|WARNING|ERROR|CRITICAL):\s*SerialBattery:|.{0,20}\*\*\* CCGX booted")
 
 
@@ -51,7 +53,7 @@ class SerialBattery(PlainLineLog):
             if data:
                 out = found["what"].lower() in {"request", "command", "sent", "sending"}
                 return [Entry(data, stamp, OUT if out else IN)]
-        return []
+        return None if _BYTES.search(said) else []
 
 
 def on_the_wire(identifier: int, data: bytes) -> int:

@@ -3,7 +3,9 @@
 
     2026-11-21T12:34:56.789Z   2026/11/21 12:34:56,789 +01:00   21.11.2026 12:34:56.78   11/21/2026 12:34:56.78 PM
     [12:34:56.789]   12:34:56:789   (12:34:56)                  the day is not known
-    1700000000.123456                                           seconds since 1970
+    Nov 21 12:34:56                                             nor is it without the year
+    1700000000.123456   1700000000   1700000000123              seconds since 1970; milli-, micro-, nanoseconds
+    20261121123456   20261121T123456.789                        date and time of day without marks
     @4000000065f0a1b23b9ac9ff                                   TAI64N, of daemontools' multilog
     0.004123   12.5s   [  12.345678]                            seconds since the log's beginning, with a fraction
 
@@ -27,8 +29,12 @@ _ZONE = r"(?:[ ]?(?P<zone>Z|[+-]\d\d:?\d\d))?"
 _END = r"(?=[\s\])}>:,;#|]|[^\x00-\x7F]|$)[\])}>:,;|]{0,2}[ \t]*"
 _OPEN = r"[ \t]*[\[({<]?[ \t]*"
 _MOMENT = re.compile(_OPEN + _DATE + r"[T ,_-]{1,2}" + _CLOCK + _ZONE + _END)
-_DAY = re.compile(_OPEN + _CLOCK + _END)
-_UNIX = re.compile(_OPEN + r"(?P<u>1\d{9})(?:\.(?P<f>\d{1,9}))?" + _END)
+_DAY = re.compile(_OPEN + r"(?:(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[ ]{1,2}\d\d?[ ])?" + _CLOCK + _END)
+_COMPACT = re.compile(
+    _OPEN + r"(?P<y>20\d\d)(?P<mo>\d\d)(?P<d>\d\d)[T _-]?(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)"
+    r"(?:[.,](?P<f>\d{1,9}))?(?P<half>)" + _ZONE + _END
+)
+_UNIX = re.compile(_OPEN + r"(?P<u>1\d{9})(?:\.(?P<f>\d{1,9})|(?P<parts>\d{3}|\d{6}|\d{9}))?" + _END)
 _TAI = re.compile(r"@(?P<t>4[0-9a-f]{15})(?P<n>[0-9a-f]{8})[ \t]+")
 _START = re.compile(_OPEN + r"(?P<u>\d{1,7})\.(?P<f>\d{1,12})[ ]?s?" + _END)
 
@@ -38,7 +44,7 @@ _TAI_EPOCH = (1 << 62) + 10  # TAI64: seconds from 1970, TAI, which daemontools 
 
 def split_stamp(text: str) -> tuple[Stamp | None, str]:
     """Take the time from the beginning of a line; the time, and the rest."""
-    if found := _MOMENT.match(text):
+    if found := _MOMENT.match(text) or _COMPACT.match(text):
         stamp = _moment(found)
         return (stamp, text[found.end() :]) if stamp else (None, text)
     if found := _TAI.match(text):
@@ -49,7 +55,7 @@ def split_stamp(text: str) -> tuple[Stamp | None, str]:
     if found := _DAY.match(text):
         return Stamp("day", *_clock(found)), text[found.end() :]
     if found := _UNIX.match(text):
-        ns, step = _fraction(found["f"])
+        ns, step = _fraction(found["f"] or found["parts"])
         return Stamp("moment", int(found["u"]) * _SECOND + ns, step), text[found.end() :]
     if found := _START.match(text):
         ns, step = _fraction(found["f"])

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The lines of a log, read in pieces: UTF-8, UTF-16 with its mark, or GB 18030, as Chinese terminal programs write."""
+"""The lines of a log, read in pieces, without colours: UTF-8, UTF-16, or GB 18030, as Chinese programs write."""
 
 from __future__ import annotations
 
 import codecs
+import re
 from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
@@ -12,19 +13,37 @@ if TYPE_CHECKING:
 PIECE = 1 << 16  # bytes; a longer line comes in pieces of about this length, cut at a blank where there is one
 
 
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
+_CONTROLS_AT_MOST = 0.02  # of the bytes of a text: a bell, a broken-off line; a raw Daly bus has more than a tenth
+_LETTERS = 8  # of UTF-16 without its mark, at least
+_COLOUR = re.compile(r"\x1b\[[0-9;]{0,20}m")
+
+
 def is_text(start: bytes) -> bool:
     """Whether a file that begins so is a text."""
-    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF8)):
+    if _utf_16(start) or start.startswith(codecs.BOM_UTF8):
         return True
-    return bool(start) and not any(byte < 0x20 and byte not in b"\t\n\v\f\r\x1b" for byte in start)
+    return bool(start) and len(_CONTROL.findall(start)) <= _CONTROLS_AT_MOST * len(start)
+
+
+def _utf_16(start: bytes) -> str:
+    """Which UTF-16 it is, by its mark, or because every second byte of its first line is zero and no other; or none."""
+    if start.startswith(codecs.BOM_UTF16_LE):
+        return "utf-16-le"
+    if start.startswith(codecs.BOM_UTF16_BE):
+        return "utf-16-be"
+    line = start[:200]
+    for encoding, zeros, others in (("utf-16-le", line[1::2], line[::2]), ("utf-16-be", line[::2], line[1::2])):
+        if len(zeros) >= _LETTERS and not any(zeros) and len(_CONTROL.findall(others)) * 20 <= len(others):
+            return encoding
+    return ""
 
 
 def text_lines(stream: BinaryIO, start: bytes = b"") -> Iterator[str]:
     """Yield the lines of a text, without their ends. ``start``: what was read from the stream already."""
-    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        encoding = "utf-16-le" if start.startswith(codecs.BOM_UTF16_LE) else "utf-16-be"
+    if encoding := _utf_16(start):
         decoder = codecs.getincrementaldecoder(encoding)("replace")
-        start = decoder.decode(start[2:]).encode("utf-8", "replace")
+        start = decoder.decode(start).removeprefix("\ufeff").encode("utf-8", "replace")
     else:
         decoder = None
         start = start.removeprefix(codecs.BOM_UTF8)
@@ -58,6 +77,7 @@ def _end(data: bytes) -> tuple[int, int] | None:
 
 def _text(line: bytes) -> str:
     try:
-        return line.decode("utf-8")
+        text = line.decode("utf-8")
     except UnicodeDecodeError:
-        return line.decode("gb18030", "replace")
+        text = line.decode("gb18030", "replace")
+    return _COLOUR.sub("", text)

@@ -15,7 +15,7 @@ from dalyref.options import Options
 from dalytools.logs.importer import Importer
 from dalytools.logs.kinds import KINDS, guess
 from dalytools.logs.serialbattery import on_the_wire
-from dalytools.logs.text_lines import text_lines
+from dalytools.logs.text_lines import is_text, text_lines
 
 ASK = bytes.fromhex("a540900800000000000000007d")
 ANSWER = bytes.fromhex("a501900802100000753001f4ea")
@@ -91,6 +91,113 @@ def test_times_of_day_go_on_behind_midnight() -> None:
     assert importer.tally.day_unknown
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "apart"),
+    [
+        ("12:34:56 ", "12:34:57 ", SECOND),
+        ("12:34:56: ", "12:34:57: ", SECOND),
+        ("12:34:56,78 ", "12:34:56,83 ", 50 * MS),
+        ("12:34:56:780 ", "12:34:56:830 ", 50 * MS),
+        ("2026-11-21 12:34:56 ", "2026-11-21 12:34:57 ", SECOND),
+        ("20261121123456 ", "20261121T123457.25,", 1250 * MS),
+        ("1700000000 ", "1700000001 ", SECOND),
+        ("1700000000123 ", "1700000000173 ", 50 * MS),
+        ("1700000000123456 ", "1700000000173456 ", 50 * MS),
+        ("1700000000123456789 ", "1700000000173456789 ", 50 * MS),
+        ("Nov 21 12:34:56 rack client[7]: TX: ", "Nov 21 12:34:57 rack client[7]: RX: ", SECOND),
+        ('"2026-11-21 12:34:56.10";"TX";"', '"2026-11-21 12:34:56.15";"RX";"', 50 * MS),
+        ("2026-11-21 12:34:56.10 - bms - DEBUG - Sent 13 bytes: ", "2026-11-21 12:34:56.15 - bms - RX: ", 50 * MS),
+        ("12:34:56\n", "12:34:57\n", SECOND),
+        ("2026-11-21 12:34:56.100:\n", "2026-11-21 12:34:56.150:\n", 50 * MS),
+    ],
+)
+def test_times_are_no_bytes(first: str, second: str, apart: int) -> None:
+    """Digits, colons and dashes could be bytes too: 12:34:56 was taken for 12 34 56."""
+    kind, packets, importer = read(f"{first}{spaced(ASK)}\n{second}{spaced(ANSWER)}\n")
+    assert kind == "hex"
+    assert [data for *_, data in packets] == [ASK, ANSWER]
+    assert packets[1][0] - packets[0][0] == apart
+    assert importer.tally.not_understood == 0
+
+
+@pytest.mark.parametrize("text", ["12:34:56:A5:40\n01:02:03\n", "1234567890 1234567890\n", "20 26 11 21 12 34 56\n"])
+def test_bytes_are_no_times(text: str) -> None:
+    _, packets, importer = read(text)
+    assert b"".join(data for *_, data in packets).hex() == "".join(c for c in text.lower() if c.isalnum())
+    assert importer.tally.timed == 0
+
+
+@pytest.mark.parametrize(
+    ("out", "back"), [("-->", "<--"), ("--->", "<---"), (">>", "<<"), ("TX", "RX"), ("bms write:", "bms read:")]
+)
+def test_directions(out: str, back: str) -> None:
+    """``-->`` was taken for a comment, and its bytes were left out."""
+    _, packets, importer = read(f"{out} {spaced(ASK)}\n{back} {spaced(ANSWER)}\n-- the end\n")
+    assert [(way, data) for _, way, data in packets] == [("outbound", ASK), ("inbound", ANSWER)]
+    assert importer.tally.not_understood == 0
+
+
+def test_the_arrow_of_arduinos_monitor_is_no_direction() -> None:
+    _, packets, _ = read(f"12:34:56.789 -> {spaced(ASK)}\n12:34:56.840 -> {spaced(ANSWER)}\n")
+    assert [(way, data) for _, way, data in packets] == [("", ASK), ("", ANSWER)]
+    _, packets, _ = read(f"12:34:56.789 -> {spaced(ASK)}\n12:34:56.840 <- {spaced(ANSWER)}\n")
+    assert [way for _, way, _ in packets] == ["outbound", "inbound"]
+
+
+def test_bytes_in_decimal() -> None:
+    for mark, ends in (", ", "[]"), (" ", ("", "")), (",", "{}"):
+        lines = [mark.join(map(str, data)).join(ends) for data in (ASK[:8], ASK[8:], ANSWER)]
+        _, packets, importer = read("\n".join(lines))
+        assert [data for *_, data in packets] == [ASK[:8], ASK[8:], ANSWER]
+        assert importer.tally.not_understood == 0
+
+
+def test_bytes_beside_their_letters_and_in_brackets() -> None:
+    shown = "".join(chr(byte) if 32 <= byte < 127 else "." for byte in ANSWER)
+    for text in (
+        f"{spaced(ANSWER)}   {shown}\n",
+        f"{spaced(ANSWER[:8])}  {spaced(ANSWER[8:])}  |{shown}|\n",
+        f"[{spaced(ANSWER)}]\n",
+        f"RX: <Buffer {ANSWER.hex(' ')}>\n",
+        "".join(f"[{byte:02x}]" for byte in ANSWER),
+    ):
+        _, packets, importer = read(text)
+        assert b"".join(data for *_, data in packets) == ANSWER
+        assert importer.tally.not_understood == 0
+    _, packets, importer = read(f"{spaced(ANSWER)}\n{spaced(ANSWER)} volts ok\n")
+    assert (len(packets), importer.tally.not_understood) == (1, 1)
+
+
+def test_colours_and_control_characters() -> None:
+    text = f"\x1b[0;32m12:34:56.100 TX {spaced(ASK)}\x1b[0m\n\x07\n" + f"12:34:56.150 RX {spaced(ANSWER)}\n" * 20
+    kind, packets, importer = read(text)
+    assert (kind, len(packets), importer.tally.not_understood) == ("hex", 21, 1)
+    assert is_text(text.encode())
+    assert is_text(text.encode("utf-16-le"))
+    assert [*text_lines(io.BytesIO(), text.encode("utf-16-be"))][1] == "\x07"
+    assert not is_text(ASK + ANSWER)
+
+
+def test_candump() -> None:
+    line = "  can0  18904001   [8]  02 10 00 00 75 30 01 F4"
+    frame = "9890400108000000" + "021000007530" + "01f4"
+    for text, times in (
+        (f" (1767225600.051248){line}\n (1767225600.151248){line}\n", [1767225600051248000, 1767225600151248000]),
+        (f" (2026-01-01 00:00:00.051248){line}\n", [1767225600051248000]),
+        (f" (000.000000){line}\n (000.500000){line}\n (000.600000){line}\n", [0, 500 * MS, 600 * MS]),
+        (f" (000.000000){line}\n (000.500000){line}\n (000.250000){line}\n", [0, 500 * MS, 750 * MS]),
+        (" (0.5)  can0  RX - -  18904001   [8]  02 10 00 00 75 30 01 F4   '....u0..'\n", [500 * MS]),
+        ("(1767225600.051248) can0 18904001#02100000753001F4 R\n", [1767225600051248000]),
+    ):
+        kind, packets, importer = read(text)
+        assert kind == "candump"
+        assert [(time, data.hex()) for time, _, data in packets] == [(time, frame) for time in times]
+        assert importer.tally.not_understood == 0
+    _, packets, importer = read(f"{line}\n  can0  123   [0]\n  can0  00000123   [0]  remote request\n{line[:-3]}\n")
+    assert [data.hex() for *_, data in packets] == [frame, "0000012300000000", "c000012300000000"]
+    assert importer.tally.not_understood == 1
+
+
 def test_docklight() -> None:
     text = (
         "Docklight Log File (HEX) - started 24.11.2026 10:00:00.00\n\n"
@@ -144,6 +251,21 @@ def test_esphome() -> None:
     assert packets[2] == (at + 1500 * MS - LENGTH, "inbound", ANSWER)
     assert packets[3][2] == b"\xa5\x01"
     assert (importer.tally.not_understood, importer.tally.coarsest_ns) == (0, SECOND)
+
+
+def test_esphome_in_decimal_and_through_home_assistant() -> None:
+    named = "2026-11-21 12:00:00.500 DEBUG (MainThread) [homeassistant.components.esphome.manager] bms @ 10.0.0.7: "
+    text = (
+        f"{named}\x1b[0;36m[D][uart_debug:114]: >>> {','.join(map(str, ASK[:4]))}\x1b[0m\n"
+        f"{named}[D][uart_debug:114]: >>> 10,12,13\n"
+        f"{named}[D][uart_debug:114]: <<< 125\n{named}[D][uart_debug:114]: <<< 77\n"
+        f"{named}[D][sensor:094]: 'Voltage': Sending state 52.8 V\n{named}[D][uart_debug:114]: <<< 1,256\n"
+    )
+    kind, packets, importer = read(text)
+    assert kind == "esphome"
+    assert b"".join(data for *_, data in packets) == ASK[:4] + bytes((10, 12, 13, 125, 77))
+    assert packets[-1][1] == "inbound"
+    assert importer.tally.not_understood == 1
 
 
 def test_dalybms() -> None:
@@ -214,6 +336,8 @@ def test_serialbattery() -> None:
     assert packets[1][2].hex() == "98954002" + "08000000" + "010d240d240d2500"
     assert packets[2][1:] == ("inbound", ANSWER)
     assert importer.tally.not_understood == 0
+    _, packets, importer = read(text + f"2025-04-19 13:14:30 DEBUG:SerialBattery:sentence {ANSWER.hex()}\n")
+    assert (len(packets), importer.tally.not_understood) == (3, 1)  # bytes of which nobody says who sent them
     assert on_the_wire(0x18A74001, b"\x02" + bytes(7)) == 0x18954001
     assert on_the_wire(0x18A74001, b"\x01" + bytes(7)) == 0x18964001
     assert on_the_wire(0x18904001, bytes(8)) == 0x18904001
@@ -241,6 +365,21 @@ def test_saleae_logic_1_and_2() -> None:
         assert [bool(packet.flags >> 31) for packet in packets] == [place == 4 for place in range(13)]
 
 
+def test_saleae_in_decimal_with_dates_and_by_analyzer() -> None:
+    decimal = "Time [s],Value,Parity Error,Framing Error\n" + "".join(f"{n}.5,{byte},,\n" for n, byte in enumerate(ASK))
+    dated = "name,type,start_time,duration,data\n" + "".join(
+        f'"Async Serial","data",2026-11-21T12:34:{n:02}.5+00:00,0.001,0x{byte:02X}\n' for n, byte in enumerate(ASK)
+    )
+    named = "Time [s],Analyzer Name,Decoded Protocol Result\n" + "".join(
+        f"{n}.5,BMS RX,0x{byte:02X}\n" for n, byte in enumerate(ASK)
+    )
+    for text, start, direction in (decimal, 0, ""), (dated, 1795264440, ""), (named, 0, "inbound"):
+        kind, packets, importer = read(text)
+        assert kind == "saleae"
+        assert packets == [(start * SECOND + n * SECOND + 500 * MS, direction, bytes((b,))) for n, b in enumerate(ASK)]
+        assert importer.tally.not_understood == 0
+
+
 def test_sigrok_and_pulseview() -> None:
     # 1 MHz, 9600 baud: a bit is 104.17 samples; the annotation spans the eight data bits
     lines: list[str] = []
@@ -254,8 +393,10 @@ def test_sigrok_and_pulseview() -> None:
     assert {way for _, way, _ in packets} == {"inbound"}
     for place, (at, *_) in enumerate(packets):
         assert abs(at - (1000 + place * 1042) * 1000) < 1000
-    _, packets, _ = read("\n".join(lines))  # the rate found from the first byte
-    assert abs(packets[-1][0] - packets[0][0] - 12 * 1042 * 1000) < 20_000
+    _, packets, _ = read("\n".join(lines))  # the rate found from the first byte, and taken as round
+    assert abs(packets[-1][0] - packets[0][0] - 12 * 1042 * 1000) < 1000
+    quoted = "\n".join(lines).replace("RX: ", 'rx-data: "').replace("\n", '"\n')
+    assert read(quoted)[1] == packets
     kind, packets, importer = read("\n".join(f"UART: TX data: {byte:02X}" for byte in ASK))
     assert kind == "sigrok"
     assert b"".join(data for *_, data in packets) == ASK
@@ -282,6 +423,8 @@ def test_nrf_connect() -> None:
     assert kind == "nrfconnect"
     assert packets == [(at + MS, "outbound", ask), (at + 152 * MS, "inbound", answer)]
     assert importer.tally.not_understood == 0
+    _, packets, _ = read(text.replace("\t19:33:32", "\t00:00:01").replace("00002a19", "0000fff1"))
+    assert packets[2][0] - packets[1][0] == (4 * HOUR + 26 * 60 * SECOND + 29 * SECOND + 848 * MS)  # the next day
 
 
 def test_hex_dumps() -> None:
