@@ -117,5 +117,5 @@ def _what_else(start: bytes) -> str:
         if start.startswith(magic):
             return text
     if not any(byte < 0x20 and byte not in b"\t\n\v\f\r\x1b" for byte in start):
-        return "is a text file, not a capture; give a pcapng or pcap file"
+        return "is a text file, not a capture; dalyshark import makes one of a log"
     return "is not a capture file; give a pcapng or pcap file"

@@ -85,7 +85,7 @@ CAPTURES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "missing": (nothing, "there is no such file"),
     "a directory": (itself, "is a directory"),
     "empty": (file_of(b""), "is empty; a capture has at least a header"),
-    "text": (file_of(b"12:00 A5 40 90\n"), "is a text file, not a capture; give a pcapng or pcap file"),
+    "text": (file_of(b"12:00 A5 40 90\n"), "is a text file, not a capture; dalyshark import makes one of a log"),
     "bytes": (file_of(bytes(range(256))), "is not a capture file; give a pcapng or pcap file"),
     "a magic alone": (file_of(WHOLE[:4]), "cut off in the middle"),
     "a header cut off": (file_of(WHOLE[:40]), "cut off in the middle of a block"),

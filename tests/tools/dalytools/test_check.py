@@ -73,7 +73,7 @@ def test_the_worst_file_decides_and_many_differences_are_cut(
     many = write(tmp_path / "many.pcapng", [(n * 0.1, (ASK, ANSWER)[n % 2]) for n in range(46)])
     assert main(["check", "--no-rules", "-q", str(text), str(many), str(SAMPLES / "real-sinowealth.pcapng")]) == 2
     shown = capsys.readouterr()
-    assert shown.err == f"dalyshark check: {text} is a text file, not a capture; give a pcapng or pcap file\n"
+    assert shown.err == f"dalyshark check: {text} is a text file, not a capture; dalyshark import makes one of a log\n"
     lines = shown.out.splitlines()
     assert lines[0] == f"{many}: 46 records (46 frame): 23 differences"
     assert lines[1] == "  packet 2  daly.soc: dissector 3.85, reference 38.5"

@@ -64,7 +64,7 @@ def test_no_packets_at_all(tmp_path: Path) -> None:
     path = tmp_path / "x"
     path.write_text("what is this?\n")
     status, drawn, said = run(path)
-    assert (status, said) == (1, "standard input is a text file, not a capture; give a pcapng or pcap file\n")
+    assert (status, said) == (1, "standard input is a text file, not a capture; dalyshark import makes one of a log\n")
     assert drawn.endswith(END)
 
 
