@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tests.tools.dalytools.findings.heard import SLOTS, Frame, tables
+from tests.tools.dalytools.findings.heard import BURSTS, SLOTS, Frame, between, tables
 from tests.tools.dalytools.findings.moments import at, during
 from tests.tools.dalytools.findings.own_answers import answers
-from tests.tools.dalytools.findings.visible import LONGEST_S, WAITS_S, exception_fits, same_request, there_at
+from tests.tools.dalytools.findings.visible import LONGEST_S, RECENT_S, WAITS_S, exception_fits, same_request, there_at
 
 if TYPE_CHECKING:
     from tests.tools.dalytools.findings.moments import Moment, Note
@@ -43,10 +43,12 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
             for note in during(notes, seconds - WAITS_S, seconds)
         )
     if moment.rule in {"unanswered", "silent"} and (
-        _harmed(moment, notes) or _newer_is_answered(moment, heard, notes) or _denied(moment, notes)
+        _harmed(moment, notes) or _newer_is_answered(moment, heard, notes) or _second_answer(moment, heard, notes)
     ):
         return True
     if moment.rule == "zero-reply" and _behind_zeros(moment, heard, notes):
+        return True
+    if moment.rule == "contradiction" and _counts_from_one(moment, heard, notes):
         return True
     return any(
         _tells(accident, moment, heard)
@@ -61,9 +63,15 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
 def _tells(accident: Frame, moment: Moment, heard: list[Frame]) -> bool:
     """Tell whether what came by accident can be behind it: of its ID; values of its board, that still count."""
     if moment.rule != "contradiction":
-        return moment.place.data_id in {None, accident.data_id}
+        return moment.place.data_id in {None, accident.data_id} or _ended_by(accident, moment, heard)
     told_from = accident.address == moment.place.board and accident.data_id in SAID_BY[moment.place.detail]
     return told_from and _held(accident, moment.seconds, heard)
+
+
+def _ended_by(accident: Frame, moment: Moment, heard: list[Frame]) -> bool:
+    """Tell whether it is the next reply behind it, of a burst that any other reply ends (records.md 8)."""
+    before = [frame for frame in between(heard, accident.seconds, moment.seconds - 1e-6) if frame.replies]
+    return moment.place.data_id in BURSTS and before == [accident]
 
 
 def _held(accident: Frame, seconds: float, heard: list[Frame]) -> bool:
@@ -73,6 +81,27 @@ def _held(accident: Frame, seconds: float, heard: list[Frame]) -> bool:
         return not any(frame.data_id == accident.data_id and frame.seconds > accident.seconds + 1e-6 for frame in mine)
     whole = [table for table in tables(mine, accident.data_id) if table.whole > accident.seconds - 1e-6]
     return len(whole) == 1 and whole[0].begins < accident.seconds + 1e-6
+
+
+def _counts_from_one(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it is told from an answer that lacks its number 0: without damage before it, it counts from 1.
+
+    So says records.md 8; each value then stands one frame too far in front.
+    """
+    for note in during(notes, moment.seconds - RECENT_S - 1.0, moment.seconds):
+        if note["what"] != "skipped_frame" or note["board"] != moment.place.board:
+            continue
+        mine = [frame for frame in heard if (frame.address, frame.data_id) == (note["board"], note["data_id"])]
+        first = next((frame for frame in mine if frame.seconds > at(note)), None)
+        if (
+            first is not None
+            and first.payload[0] == 1
+            and any(frame.payload[0] == 0 for frame in mine if frame.seconds < first.seconds)
+            and first.data_id in SAID_BY[moment.place.detail]
+            and _held(first, moment.seconds, heard)
+        ):
+            return True
+    return False
 
 
 def _harmed(moment: Moment, notes: list[Note]) -> bool:
@@ -93,13 +122,21 @@ def _begins(data: bytes, data_id: int | None) -> bool:
     return any(data[place] == 0xA5 and data[place + 2] == data_id for place in range(len(data) - 2))
 
 
-def _denied(moment: Moment, notes: list[Note]) -> bool:
-    """Tell whether it is a write to D2, or its answer with another value: nothing tells one from the other."""
+def _second_answer(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it is an answer to a write to D2 that looks like a request, or a write that so has no answer.
+
+    D2 is both sides' address: one with another value, or a second board's, is told by nothing (wires.md 1).
+    """
     return any(
-        (note["what"], note.get("dialect"), note.get("result")) == ("write", "d2", "denied")
-        and note.get("register") == moment.place.register
+        (note["what"], note.get("dialect"), note.get("register")) == ("write", "d2", moment.place.register)
+        and (note["result"] == "denied" or _modbus_frames(heard, at(note), moment.seconds) > 1)
         for note in during(notes, moment.seconds - LONGEST_S, moment.seconds + 1e-3)
     )
+
+
+def _modbus_frames(heard: list[Frame], asked: float, last: float) -> int:
+    """Count good frames of Modbus behind a request, up to one."""
+    return sum(frame.modbus for frame in between(heard, asked + 1e-3, last + 1e-6))
 
 
 def _newer_is_answered(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:

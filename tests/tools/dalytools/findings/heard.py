@@ -54,6 +54,11 @@ class Frame(NamedTuple):
         return 0 <= self.address < FIRST_REQUEST
 
     @property
+    def begins(self) -> bool:
+        """No later frame of a burst."""
+        return self.data_id not in BURSTS or self.payload[0] <= 1
+
+    @property
     def ends(self) -> float:
         """When its last byte ends, s; on CAN the time stamp is all there is."""
         return self.seconds if self.size == CAN_SIZE else self.seconds + self.size / 960

@@ -16,7 +16,7 @@ from tests.tools.dalytools.findings.explained import explained
 from tests.tools.dalytools.findings.heard import Frame, frames
 from tests.tools.dalytools.findings.injected import search
 from tests.tools.dalytools.findings.moments import Moment, Note, at, during
-from tests.tools.dalytools.findings.visible import hidden, sent_by
+from tests.tools.dalytools.findings.visible import LATER_S, hidden, sent_by
 
 from dalytools.findings.finding import Finding, Severity, Tally
 from dalytools.simulator.capture_file import write_capture
@@ -40,8 +40,8 @@ class Rule(NamedTuple):
 FOUND_BY = {
     # The last frame of a burst that was cut off, or the first one behind a hole, comes a little later.
     "unanswered": Rule(("unanswered",), 0.01, 0.01),
-    # In the middle of the answer to a retry, it looks like a part that comes twice.
-    "late": Rule(("late", "wrong-board", "burst-repeat"), 0.01, 1.0),
+    # It waits until the line is free. In the middle of the answer to a retry, it looks like a part that comes twice.
+    "late": Rule(("late", "wrong-board", "burst-repeat"), 0.01, LATER_S),
     "echo": Rule(("echo",), 0.01, 0.01),
     "zero_reply": Rule(("zero-reply",), 0.01, 0.3),
     # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus.
@@ -232,14 +232,17 @@ def _load_unknown(moment: Moment, heard: list[Frame], phase: float) -> bool:
 
 
 def _caused(moment: Moment, notes: list[Note]) -> bool:
-    """Tell whether a note of its place is behind it: one that this rule finds, in time; or another, not long before."""
+    """Tell whether a note of its place is behind it: one that this rule finds, in time; or another, not long before.
+
+    A number of frames changes twice: to another, and with the board's next answer back.
+    """
     causes = {*CAUSES.get(moment.rule, ()), *PLANTED.keys() & {moment.rule.replace("-", "_")}}
     ago = LONG_AGO_S.get(moment.rule, AGO_S)
     return any(
         note["what"] in causes
         and _fits(note, moment.place)
         and _of_its_board(note, moment)
-        and (moment.rule not in _rule(note).rules or _in_time(note, moment.seconds))
+        and (moment.rule == "burst-length" or moment.rule not in _rule(note).rules or _in_time(note, moment.seconds))
         for note in during(notes, moment.seconds - ago, moment.seconds + 0.3)
     )
 

@@ -27,6 +27,20 @@ def test_damage_explains_only_where_it_is_a_good_frame() -> None:
     assert not explained(counted("late", 2.0, board=1), [before, Frame(1.5, 13)], [note], 1.5)
 
 
+def test_a_good_frame_by_accident_ends_a_burst() -> None:
+    note = {"what": "damaged", "time": 1.0136}
+    first, accident, third = heard(1.0, 1, 0x95, "01"), heard(1.0136, 1, 0x08), heard(1.0271, 1, 0x95, "03")
+    says = counted("unasked", 1.0271, data_id=0x95)
+    assert explained(says, [first, accident, third], [note], 1.5)
+    assert not explained(says, [first, Frame(1.0136, 13), third], [note], 1.5)
+    asked = accident._replace(address=0x40)
+    assert not explained(says, [first, asked, third], [note], 1.5)
+    fourth = counted("unasked", 1.0407, data_id=0x95)
+    assert not explained(fourth, [first, accident, third, heard(1.0407, 1, 0x95, "04")], [note], 1.5)
+    single = counted("unasked", 1.0271, data_id=0x90)
+    assert not explained(single, [first, accident, heard(1.0271, 1, 0x90)], [note], 1.5)
+
+
 def test_cells_that_came_by_accident_explain_until_there_is_a_newer_table() -> None:
     note = {"what": "damaged", "time": 2.0136}
     count, first, accident = heard(1, 1, 0x94, "0601"), heard(2, 1, 0x95, "010ce4"), heard(2.0136, 1, 0x95, "02ffff")
@@ -76,13 +90,18 @@ def test_an_unanswered_request_is_explained_by_harm_to_its_exchange() -> None:
     assert not explained(counted("late", 1.0, data_id=0x90), [asked, Frame(1.05, 14)], [note], 1.5)
 
 
-def test_a_write_to_d2_with_another_answer_is_two_requests() -> None:
+def test_an_answer_to_a_write_to_d2_that_is_not_the_same_or_comes_twice_is_a_request() -> None:
     note = {"what": "write", "time": 1.0, "dialect": "d2", "register": 0xA5, "result": "denied"}
+    asked, answer, again = (Frame(seconds, 8, modbus=True) for seconds in (1.0, 1.05, 1.1))
     says = Moment("unanswered", Place(address=0xD2, register=0xA5), Severity.WARNING, 1.1)
-    assert explained(says, [], [note], 1.5)
+    assert explained(says, [asked, again], [note], 1.5)
+    assert explained(says._replace(seconds=1.0), [asked, again], [note], 1.5)
     assert not explained(says._replace(seconds=1.4), [], [note], 1.5)
-    assert not explained(says, [], [{**note, "result": "none"}], 1.5)
-    assert not explained(says, [], [{**note, "register": 0xA6}], 1.5)
+    assert not explained(says, [asked, again], [{**note, "register": 0xA6}], 1.5)
+    confirmed = {**note, "result": "confirmed"}
+    assert explained(says, [asked, answer, again], [confirmed], 1.5)
+    assert not explained(says, [asked, again], [confirmed], 1.5)
+    assert not explained(says._replace(seconds=1.0), [asked, answer, again], [confirmed], 1.5)
 
 
 def test_zeros_right_behind_zeros_of_waking_up_are_not_told_from_them() -> None:
@@ -95,3 +114,20 @@ def test_zeros_right_behind_zeros_of_waking_up_are_not_told_from_them() -> None:
     assert not explained(says, [woke, true], [{**note, "board": 2}], 1.5)
     assert not explained(says, [woke, heard(1.4, 1, 0xD8, "01")], [note], 1.5)
     assert not explained(says, [true], [note], 1.5)
+
+
+def test_an_answer_without_its_number_0_counts_from_1() -> None:
+    note = {"what": "skipped_frame", "time": 3.0, "board": 1, "data_id": 0x95, "frame": 1}
+    count = heard(1, 1, 0x94, "0601")
+    usual = [heard(2, 1, 0x95, "000ce4"), heard(2.0136, 1, 0x95, "010ce4")]
+    shifted = [heard(3.05, 1, 0x95, "010ce4"), heard(3.0636, 1, 0x95, "02")]
+    says = counted("contradiction", 4.0, detail="cell_min")
+    assert explained(says, [count, *usual, *shifted], [note], 11.0)
+    assert not explained(says, [count, *shifted], [note], 11.0)  # no board that counts from 0
+    assert not explained(says, [count, *usual, *shifted], [{**note, "board": 2}], 11.0)
+    assert not explained(says, [count, *usual, heard(3.05, 1, 0x95, "000ce4"), *shifted], [note], 11.0)
+    assert not explained(
+        says._replace(place=Place(board=1, detail="temperature_min")), [count, *usual, *shifted], [note], 11
+    )
+    newer = [frame._replace(seconds=frame.seconds + 1.5) for frame in usual]
+    assert not explained(says, [count, *usual, *shifted, *newer], [note], 11.0)

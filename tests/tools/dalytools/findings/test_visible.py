@@ -66,6 +66,7 @@ def test_a_late_reply_that_a_newer_request_takes_is_not_late() -> None:
     assert not hidden(note, [newer, heard(4.85, 1, 0x90), comes], [note])
     assert not hidden(note, [heard(4.3, 0x40, 0x90), comes], [note])  # late for this one too
     assert not hidden(note, [heard(4.8, 0x41, 0x90), comes], [note])
+    assert not hidden(note, [newer, comes, heard(6.1, 1, 0x90)], [note])  # the line was not free before
 
 
 def test_what_was_damaged_is_hidden_only_where_nothing_of_it_was_heard() -> None:

@@ -21,6 +21,8 @@ LONGEST_S = 0.3
 """Of a frame at 9600 baud: 261 bytes."""
 LATE_S = 0.5
 """From when on ``check`` calls a reply late."""
+LATER_S = 2.0
+"""For so long at the most a late reply waits until the line is free."""
 SILENCE_S = 0.25
 NO_BOARD = frozenset((0x80, 0x20))
 D2 = 0xD2
@@ -98,14 +100,17 @@ def _answers_another(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     if "data_id" not in note:
         return False
     data_id, board = int(str(note["data_id"])), int(str(note["board"]))
-    replies = [frame for frame in between(heard, at(note) - 1e-3, at(note) + WAITS_S) if _is_of(frame, note)]
-    given = answers(heard, data_id, at(note) - WAITS_S, at(note) + WAITS_S)
+    within = LATER_S if note["what"] == "late" else 1e-3
+    replies = [
+        frame for frame in between(heard, at(note) - 1e-3, at(note) + within) if _is_of(frame, note) and frame.begins
+    ]
+    given = answers(heard, data_id, at(note) - WAITS_S, at(note) + within)
     quick = {
         reply
         for request, reply in given.items()
         if reply.seconds - request.ends <= LATE_S and request.address in NO_BOARD | {0x3F + board}
     }
-    return bool(replies) and replies[0] in quick
+    return bool(replies) and quick.issuperset(replies)
 
 
 def sent_by(note: Note, board: int) -> bool:
