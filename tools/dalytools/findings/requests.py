@@ -27,6 +27,8 @@ _REMEMBERED = 1024  # requests
 _INVERTERS = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV))
 _SINOWEALTH = "Sinowealth"
 _MODBUS = "Modbus"
+_ANSWERS_81, _ASKS_81 = range(0x51, 0x61), 0x30
+"""50 + N answers what 80 + N was asked (docs/records.md 2)."""
 _LONG_S = 3.0
 """A board that is quiet so long did not just miss a request."""
 _SOMETIMES = (
@@ -112,6 +114,11 @@ class Requests(Watch):
             if late is not None:
                 late.late += 1
                 late.spoke()
+            if "daly.modbus.ambiguous" in record.fields:  # one of several requests was answered
+                line = self._lines[_line(record, bus)]
+                line.answered += 1
+                dialect.answered += 1
+                line.spoke()
         elif direction == ECHO:
             self._echo(record, bus)
         elif direction == REQUEST:
@@ -247,12 +254,12 @@ def _seconds(tally: Tally) -> float:
 
 
 def _line(record: Decoded, bus: str) -> Place:
-    """Whom a request is for, whatever it asks."""
+    """Whom a request is for, whatever it asks; or a reply of Modbus comes from."""
     board = number(record.fields, "daly.board")
     address = address_of(record.fields)
     modbus = "daly.modbus.address" in record.fields
     if modbus and address is not None:
-        return Place(bus, address=address, detail=_MODBUS)
+        return Place(bus, address=address + _ASKS_81 if address in _ANSWERS_81 else address, detail=_MODBUS)
     return Place(bus, board) if board is not None else Place(bus, address=address)
 
 

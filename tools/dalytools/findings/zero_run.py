@@ -78,8 +78,10 @@ class ZeroRun:
         if self.proven:
             self.kept |= went
             went = set[str]()
-        else:
-            self.told = self.told or self._perhaps_told
+        elif self._perhaps_told:
+            self.told = True
+            went |= self.kept
+            self.kept = set[str]()
         self._perhaps_told = False
         self.proven = False
         self.waiting.clear()

@@ -109,6 +109,9 @@ STATES = {"mos_off_by_command", "charging_cabinet_offline"}
 """Bits that are no faults (docs/protocol.md, a.98)."""
 AGO_S = 1.5
 LONG_AGO_S = {"contradiction": 11.0, "burst-length": 20.0, "write-no-effect": 20.0}
+OF_ANSWERS = {"cut_burst", "skipped_frame", "repeated_frame"}
+MOST_REPLY_S = 0.15
+"""A simulated board begins to answer within that."""
 OF_THE_SCENARIO = {"two-hosts", "not-polled"}
 """Rules that find what a scenario is, not what happens in it."""
 
@@ -156,7 +159,7 @@ def judge(
     )
     heard = frames(path, scenario.start_ns)
     last = max(frame.seconds for frame in heard)
-    everything: list[Note] = sorted([*written.truth.notes, *more], key=at)
+    everything = sorted(_when_heard([*written.truth.notes, *more]), key=at)
     out.notes = [note for note in everything if note["what"] in FOUND_BY | PLANTED and _told(note, last, wire)]
     for note in out.notes:
         if not _found(note, moments):
@@ -182,6 +185,23 @@ def judge(
 
 def _seconds(moment: Moment) -> float:
     return moment.seconds
+
+
+def _when_heard(notes: list[Note]) -> list[Note]:
+    """Give what was done to an answer that comes late the time of the answer, not of its request."""
+    late = [note for note in notes if note["what"] == "late" and "data_id" in note]
+    out: list[Note] = []
+    for note in notes:
+        answers = [one for one in late if note["what"] in OF_ANSWERS and _is_answer(one, note)]
+        out.append({**note, "time": at(answers[0])} if answers else note)
+    return out
+
+
+def _is_answer(late: Note, note: Note) -> bool:
+    """Tell whether a late reply is that of a note: of its board and ID, meant for that time."""
+    meant = at(late) - float(str(late["delay_s"]))
+    same = (late["board"], late["data_id"]) == (note["board"], note["data_id"])
+    return same and 0 <= meant - at(note) < MOST_REPLY_S
 
 
 def _told(note: Note, last: float, wire: str) -> bool:

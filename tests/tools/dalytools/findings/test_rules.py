@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from tests.meaning import a5, cells, extremes, status
-from tests.meaning_modbus import brings, read
+from tests.meaning_modbus import brings, read, rtu
 from tests.tools.dalytools.findings.injected import (
     BESIDES,
     CASES,
@@ -468,6 +468,37 @@ def test_faults_that_zeros_seemed_to_clear_were_there_all_the_time(tmp_path: Pat
     found = search(capture(tmp_path / "woke.pcapng", [*packets, *LATER]))
     assert {finding.rule for finding in found} == {"zero-reply", "fault-standing"}
     assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
+
+
+def test_zeros_that_are_true_end_a_fault_that_other_zeros_seemed_to_clear(tmp_path: Path) -> None:
+    """It wakes with zeros; then, awake, it has no fault; and then one comes again."""
+    packets = [
+        *asked(0, 0x98, FAULTY),
+        *(heard for at, data_id in enumerate((0x98, 0x90), 2) for heard in asked(at, data_id, a5(1, data_id))),
+        *asked(5, 0x90, PACK),
+        *asked(6, 0x98, FINE),
+        *asked(7, 0x90, PACK),
+        *asked(8, 0x98, FAULTY),
+    ]
+    found = search(capture(tmp_path / "woke.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"zero-reply", "fault-standing", "fault-raised"}
+    assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
+
+
+@pytest.mark.parametrize(("asks", "answers"), [("d2", "d2"), ("81", "51")])
+def test_a_reply_that_fits_several_requests_is_no_silence(asks: str, answers: str, tmp_path: Path) -> None:
+    """One answer to two requests, three times; each leaves one without a reply."""
+    packets = [
+        heard
+        for at in (5, 8, 11)
+        for heard in (
+            Heard(at, rtu(f"{asks}0300630002")),
+            Heard(at + 0.03, rtu(f"{asks}0300830002")),
+            Heard(at + 0.06, rtu(f"{answers}0304ffffffff")),
+        )
+    ]
+    found = search(capture(tmp_path / "two.pcapng", [*CLEAN, *packets, *LATER]))
+    assert {finding.rule for finding in found} == {"modbus-ambiguous", "unanswered"}
 
 
 def test_zeros_before_a_silence_are_not_of_the_waking_up_behind_it(tmp_path: Path) -> None:

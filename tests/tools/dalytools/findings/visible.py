@@ -164,7 +164,7 @@ def _gap_is_mixed(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     until = heard[last + 1].seconds if last + 1 < len(heard) and _follows(heard, last) else heard[last].ends + SILENCE_S
     return any(
         other["what"] in {"damaged", "collision"} and other.get("harmed") is not False
-        for other in during(notes, heard[first].seconds - 1e-3, until - 1e-3)
+        for other in during(notes, heard[first].seconds - 1e-3, until + 1e-3)
     )
 
 
