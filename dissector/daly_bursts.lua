@@ -11,7 +11,7 @@ local results_module = require("daly_results")
 
 local M = {}
 
-local byte = string.byte
+local byte, char, sub, concat = string.byte, string.char, string.sub, table.concat
 local GRACE = exchange.GRACE
 local later = results_module.later
 
@@ -44,30 +44,67 @@ local function shape_of(base, count)
   return shape
 end
 
--- Slots of a 0x95 (mV) or 0x96 (raw) frame into the burst; the table of all, when this frame holds the last one and
--- none is missing.
+-- Slots of a 0x95 (mV) or 0x96 (raw) frame into a burst whose count is not known.
 local function note_values(burst, raw, number)
   local values = burst.values
-  local first
   if burst.id == 0x95 then
     local _, _, _, _, _, a, b, c, d, e, f = byte(raw, 1, 11)
-    first = 3 * (number - burst.base) + 1
+    local first = 3 * (number - burst.base) + 1
     values[first], values[first + 1], values[first + 2] = a * 256 + b, c * 256 + d, e * 256 + f
   else
-    first = 7 * (number - burst.base) + 1
+    local first = 7 * (number - burst.base) + 1
     for i = 0, 6 do
       values[first + i] = byte(raw, 6 + i)
     end
   end
-  local count = burst.count
-  if count and count >= first and count < first + burst.per_frame and burst.whole then
-    local list = {}
-    for i = 1, count do
-      list[i] = values[i]
+end
+
+-- A table of all cells or sensors is kept as a string, which takes a twentieth of what its burst takes:
+--
+--   base | count | bytes of a value, 1 or 2 | values, big-endian, and what else was in the last frame
+local packed_last, list_last, shape_last -- what was read last
+
+local function read_table(packed)
+  if packed ~= packed_last then
+    local base, count, width = byte(packed, 1, 3)
+    local list = { byte(packed, 4, 3 + count * width) }
+    if width == 2 then
+      for i = 1, count do
+        list[i] = list[2 * i - 1] * 256 + list[2 * i]
+      end
+      for i = 2 * count, count + 1, -1 do
+        list[i] = nil
+      end
     end
-    return list
+    packed_last, list_last, shape_last = packed, list, shape_of(base, count)
+  end
+  return list_last, shape_last
+end
+
+-- The same of a burst with a known count; the table of all as a string, when this frame holds the last one and none is
+-- missing.
+local function note_piece(burst, raw, number)
+  local pieces, per_frame, count = burst.pieces, burst.per_frame, burst.count
+  local place = number - burst.base
+  local wide = burst.id == 0x95
+  pieces[place + 1] = sub(raw, 6, wide and 11 or 12)
+  local before = per_frame * place
+  if count > before and count <= before + per_frame and burst.whole then
+    return char(burst.base, count, wide and 2 or 1) .. concat(pieces, "", 1, place + 1)
   end
   return nil
+end
+
+--- What a frame of a burst is shown with (daly_results' memory): base and count, or the burst; what is odd, or nil; the
+-- table of all cells or sensors, a list that nobody may change, or nil.
+function M.open(memory)
+  if type(memory) == "string" then
+    local list, shape = read_table(memory)
+    return shape, nil, list
+  elseif memory and memory.burst then
+    return memory.burst, memory, memory.table
+  end
+  return memory, nil, nil
 end
 
 --- Whether a burst with a known count has not reached its last cell or sensor.
@@ -150,12 +187,15 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
       request = request,
       count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil,
       per_frame = per_frame,
-      values = per_frame and {} or nil, -- by cell or sensor
+      pieces = nil, -- where the count is known: data bytes of its frames
+      values = nil, -- where it is not: by cell or sensor
       texts = not per_frame and {} or nil, -- by frame number
       whole = true, -- every frame from the base on was seen
       parts = {}, -- slots of its frames, until the table is there
       table_in = nil,
     }
+    burst.pieces = burst.count and {} or nil
+    burst.values = per_frame and not burst.count and {} or nil
     state.burst = burst
     from = burst.base
   end
@@ -167,15 +207,18 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
     burst.whole = false
   end
   burst.number, burst.ended, burst.asked, burst.last, burst.last_in = number, ends, nil, slot, packet
-  local list
-  if burst.values then
-    list = note_values(burst, raw, number)
+  local packed, list
+  if burst.pieces then
+    packed = note_piece(burst, raw, number)
+    list = packed and read_table(packed)
+  elseif burst.values then
+    note_values(burst, raw, number)
   else
-    burst.texts[number] = raw:sub(6, 12)
+    burst.texts[number] = sub(raw, 6, 12)
   end
-  local memory = burst.count and shape_of(burst.base, burst.count) or burst
-  if missing or again or list then
-    memory = { burst = memory, missing = missing, again = again, table = list }
+  local memory = packed or burst.count and shape_of(burst.base, burst.count) or burst
+  if missing or again then
+    memory = { burst = M.open(memory), missing = missing, again = again, table = list }
   end
   if burst.table_in then
     wait = -burst.table_in
@@ -202,8 +245,7 @@ function M.whole_in(results, slot, again)
   if wait and wait < 0 then
     return -wait
   end
-  local memory = results.memory[slot]
-  local burst = memory and memory.burst or memory
+  local burst = M.open(results.memory[slot])
   if not again or not burst then
     return nil
   end

@@ -60,11 +60,7 @@ end
 
 -- The burst that a 0x95, 0x96 or text frame belongs to, and what was odd about the frame.
 local function burst_of(frame)
-  local memory = frame.memory
-  if memory and memory.burst then
-    return memory.burst, memory
-  end
-  return memory, nil
+  return bursts.open(frame.memory)
 end
 
 -- 0x90: voltage.2 gather.2 current.2 soc.2
@@ -206,14 +202,11 @@ end
 --- What this frame carries of its whole burst: the list of all cells (mV) or sensors (raw), the text; nil, nil where
 -- another carries it, or none. `again`: the capture was read to its end.
 function M.whole(slot, memory, again)
-  if not memory then
-    return nil, nil
+  local burst, _, list = bursts.open(memory)
+  if list then
+    return list, nil
   end
-  if memory.table then
-    return memory.table, nil
-  end
-  local burst = memory.burst or memory
-  if again and burst.last == slot and burst.whole and not burst.count then
+  if again and burst and burst.last == slot and burst.whole and not burst.count then
     if burst.values then
       return burst.values, nil
     end

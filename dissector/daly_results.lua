@@ -11,8 +11,9 @@
 --                                                              the packet that has the burst's table; or false
 --   memory     its bus                                         what it is shown with, or false:
 --                                                              0x90: state of the newest 0x93; 0x98: data bytes of the
---                                                              one before; 0x95, 0x96, texts: the burst (only base
---                                                              and count, where the count is known), or { burst =,
+--                                                              one before; 0x95, 0x96, texts: what daly_bursts.open
+--                                                              reads: the burst (only base and count, where the count
+--                                                              is known); the table of all as a string; or { burst =,
 --                                                              missing =, again =, table = } where there is more;
 --                                                              Modbus: see daly_modbus_board
 --
