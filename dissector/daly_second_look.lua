@@ -12,7 +12,7 @@ local M = {}
 function M.new(state)
   return {
     state = state,
-    after = {}, -- by packet number: the next packet's
+    after = {}, -- by packet number: the next packet's, where that does not follow it
     newest = 0, -- the last of those
     last = 0, -- the last packet that was read again
     only = nil, -- the line
@@ -23,7 +23,9 @@ end
 --- A packet was read without knowing all about it.
 function M.note(blind, number)
   if number ~= blind.newest then
-    blind.after[blind.newest] = number
+    if number ~= blind.newest + 1 then
+      blind.after[blind.newest] = number
+    end
     blind.newest = number
   end
 end
@@ -34,7 +36,8 @@ end
 function M.look(blind, first, number, line, surprise, read, ...)
   blind.only = blind.only or line
   blind.several = blind.several or line ~= blind.only or surprise
-  if number == blind.after[blind.last] then
+  local last = blind.last
+  if last < blind.newest and number == (blind.after[last] or last + 1) then
     read(blind.state, ...)
     blind.last = number
   end
