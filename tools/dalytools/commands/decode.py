@@ -23,7 +23,7 @@ from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_binary_file, whole_file
 from dalytools.wires import choice, left_out
 from dalytools.wires.carried import carried
-from dalytools.wires.carriers import NOT_READ, Carriers
+from dalytools.wires.carriers import Carriers
 
 if TYPE_CHECKING:
     import argparse
@@ -223,12 +223,9 @@ def _decode_file(
                     put(name, record)
             shown += len(batch)
     left_out.say("decode", name, carriers.left_out)
-    if others:
+    if others and passed != packets:
         names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
-        if passed == packets:
-            problems.append(f"{name}: its link type is {names}; {NOT_READ}")
-        else:
-            print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
+        print(f"dalyshark decode: {plain(name)}: {passed} packets passed over ({names})", file=sys.stderr)  # noqa: T201
     elif not packets and not problems:
         print(f"dalyshark decode: {plain(name)}: the capture holds no packet", file=sys.stderr)  # noqa: T201
     return shown

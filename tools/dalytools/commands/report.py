@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import argparse
 
     from dalyref.decoder import Decoded
+    from dalytools.findings.finding import Finding
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,16 +49,12 @@ def run(args: argparse.Namespace) -> int:
     if os.path.realpath(output) in {os.path.realpath(name) for name in files}:
         raise Problem(f"{output} is one of the captures; name another file with -o")
     collected = Collected()
-    found: list[tuple[str, str, str]] = []
+    found: list[tuple[str, Finding]] = []
     problems: list[str] = []
     for name in files:
         search = Search(Limits())
         _read(name, args, collected, search, problems)
-        where = f"{Path(name).name}: " if len(files) > 1 else ""
-        found += [
-            (str(finding.severity), finding.rule, f"{where}{finding.place}: {finding.text}. {finding.advice}")
-            for finding in search.findings()
-        ]
+        found += [(Path(name).name if len(files) > 1 else "", finding) for finding in search.findings()]
     if len(problems) == len(files) == 1 and not collected.records:
         raise Problem(problems[0])
     for problem in problems:

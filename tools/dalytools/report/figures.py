@@ -111,9 +111,10 @@ def board_figure(board: BoardSeen, collected: Collected) -> Figure:
     rows.row(
         "Switches and state",
         _steps(rows, series, ("charge MOS", "discharge MOS")) + _state(rows, series),
-        tickvals=[0, 1, 2, 3, 4, 5],
-        ticktext=["off", "on", "off", "on", "", ""],
-        range=[-0.4, 4.9],
+        tickvals=[0, 1, 2, 3, 4, 5, 6],
+        ticktext=["charge off", "on", "discharge off", "on", *_STATES.values()],
+        tickfont={"size": 10},
+        range=[-0.4, 6.5],
     )
     rows.row("Faults", _faults(rows, board, collected.end), type="category", autorange="reversed")
     rows.row("Balancing, share of the time", _balancing(rows, board), title="cell")
@@ -232,7 +233,7 @@ def _state(rows: _Rows, series: dict[str, Series]) -> list[Trace]:
             "mode": "lines",
             "name": "state",
             "x": rows.times(times),
-            "y": [4 + value * 0.4 for value in values],
+            "y": [4 + min(value, 2.4) for value in values],
             "text": [_STATES.get(int(value), f"state {value:.0f}") for value in values],
             "line": {"shape": "hv", "width": 2},
             "hovertemplate": "%{text}",

@@ -12,11 +12,13 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from dalytools import __version__
+from dalytools.findings.table import when
 from dalytools.report.figures import board_figure, bus_figure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from dalytools.findings.finding import Finding
     from dalytools.report.collect import Collected
     from dalytools.report.figures import Figure
 
@@ -32,6 +34,10 @@ h1 { font-size: 1.5em; margin: .3em 0; overflow-wrap: anywhere; } h2 { font-size
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; margin: .4em 0; font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid var(--line); padding: 3px 12px 3px 0; text-align: left; vertical-align: top; }
+.found td:last-child { overflow-wrap: anywhere; } .found td:first-child + td { white-space: nowrap; }
+@media (max-width: 640px) { .found tr { display: block; padding: 6px 0; border-bottom: 1px solid var(--line); }
+  .found td { display: inline-block; border: 0; padding-bottom: 0; } .found td:last-child { display: block; } }
+td:first-child { white-space: nowrap; }
 th { font-weight: 600; color: var(--faint); } td.n, th.n { text-align: right; }
 button { font: inherit; color: inherit; background: var(--box); border: 1px solid var(--line); border-radius: 6px;
   padding: 3px 10px; } .top { display: flex; justify-content: space-between; align-items: start; gap: 12px; }
@@ -60,9 +66,12 @@ _SCRIPT = """
     root.classList.toggle('dark', dark);
     boxes.forEach(function (box) { Plotly.relayout(box, colours()(box.layout)); });
   }
+  var narrow = window.innerWidth < 640;
   figures.forEach(function (figure) {
     var box = document.getElementById(figure.id);
-    Plotly.newPlot(box, figure.data, figure.layout, { responsive: true, displaylogo: false, scrollZoom: false });
+    if (narrow && figure.data.length > 12) { figure.layout.showlegend = false; }
+    Plotly.newPlot(box, figure.data, figure.layout,
+      { responsive: true, displaylogo: false, scrollZoom: false, displayModeBar: narrow ? false : 'hover' });
     boxes.push(box);
     box.on('plotly_relayout', function (change) {
       if (busy) { return; }
@@ -84,10 +93,11 @@ _SCRIPT = """
 """
 
 
-def page(title: str, collected: Collected, found: Sequence[tuple[str, str, str]], library: str) -> str:
+def page(title: str, collected: Collected, found: Sequence[tuple[str, Finding]], library: str) -> str:
     """Return the page.
 
-    title: what was reported on. found: rows of what was found (severity, name, sentence). library: plotly.js.
+    title: what was reported on. found: what was found, each with the file's name, or nothing where there is only one.
+    library: plotly.js.
     """
     figures = [("bus", bus_figure(collected))]
     body = [_head(title, collected), _found(found)]
@@ -132,16 +142,25 @@ def _head(title: str, collected: Collected) -> str:
     )
 
 
-def _found(found: Sequence[tuple[str, str, str]]) -> str:
+def _found(found: Sequence[tuple[str, Finding]]) -> str:
     if not found:
         return "<h2>Found</h2>\n<p>Nothing to complain of.</p>"
     classes = {"error": "bad", "warning": "warn"}
-    rows = [
-        f'<tr><td class="{classes.get(severity, "faint")}">{_text(severity)}</td><td>{_text(name)}</td>'
-        f"<td>{_text(sentence)}</td></tr>"
-        for severity, name, sentence in found
-    ]
-    return f'<h2>Found</h2>\n<div class="wide"><table>{"".join(rows)}</table></div>'
+    rows: list[str] = []
+    advised: set[tuple[str, str]] = set()
+    for file, finding in found:
+        where = f"{file}: {finding.place}" if file else str(finding.place)
+        moment = when(finding.tally).replace("\n", ", ", 1).replace("\n", " to ")
+        faint = [*finding.examples, f"packets {moment}" if moment[0].isdigit() else moment]
+        if (finding.rule, finding.advice) not in advised:  # once is enough for people
+            faint.append(f"→ {finding.advice}")
+            advised.add((finding.rule, finding.advice))
+        rows.append(
+            f'<tr><td class="{classes.get(str(finding.severity), "faint")}">{_text(str(finding.severity))}</td>'
+            f"<td>{_text(finding.rule)}</td><td>{_text(f'{where}: {finding.text}')}"
+            f'<div class="faint">{"<br>".join(map(_text, faint))}</div></td></tr>'
+        )
+    return f'<h2>Found</h2>\n<div class="wide"><table class="found">{"".join(rows)}</table></div>'
 
 
 def _responses(collected: Collected) -> str:

@@ -6,7 +6,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dalycapture.errors import CaptureError
+from dalycapture.linktype import link_type_name
 from dalycapture.reader import read_capture
+from dalytools.wires.carriers import NOT_READ
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -31,15 +33,23 @@ def carried(
     packet: is told each packet of the file before what it carries; advance: how many there were, now and then. What is
     wrong with the file, or with what was chosen for it, is appended to `problems`.
     """
+    ours, others = False, set[int]()
     try:
         for count, one in enumerate(read_capture(name), 1):
             if packet is not None:
                 packet(one)
+            if carriers.reads(one.link_type):
+                ours = True
+            else:
+                others.add(one.link_type)
             yield from carriers.of(one)
             if advance is not None and count % ADVANCE_EVERY == 0:
                 advance(count)
     except CaptureError as error:
         problems.append(str(error))
     yield from carriers.finish()
+    if others and not ours:
+        names = ", ".join(link_type_name(number) for number in sorted(others)[:5])
+        problems.append(f"{name}: its link type is {names}; {NOT_READ}")
     if carriers.nothing:
         problems.append(f"{name}: {carriers.nothing}")

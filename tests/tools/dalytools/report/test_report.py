@@ -117,3 +117,32 @@ def test_what_cannot_be_reported_is_a_line(tmp_path: Path, capsys: pytest.Captur
     assert "name another file" in said
     assert "Traceback" not in said
     assert not out.exists()
+
+
+def test_what_was_found_has_its_time_and_says_what_to_do_once(faults: Path) -> None:
+    text = faults.read_text("utf-8")
+    assert text.count(">fault-raised<") > 1
+    assert text.count("see what the battery did at that time") == 1
+    assert re.search(
+        r"made-faults.pcapng: board 1, \w+: raised 1 time.*?<div class=\"faint\">packet \d+, \d\d:\d\d:", text
+    )
+
+
+def test_a_capture_of_tcp_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "clean-tcp", "--duration", "3", "-w", str(tmp_path / "tcp.pcapng")]) == 0
+    for words in (["report", "-o", str(tmp_path / "x.html")], ["survey"], ["decode"]):
+        capsys.readouterr()
+        assert main([*words, str(tmp_path / "tcp.pcapng")]) == 2
+        assert "its link type is 1 (Ethernet); what is read is" in capsys.readouterr().err
+    assert main(["report", str(tmp_path / "tcp.pcapng"), "--tcp-ports", "8899", "-o", str(tmp_path / "x.html")]) == 0
+
+
+def test_many_cells_leave_room_for_the_plots_on_a_phone(tmp_path: Path) -> None:
+    """With 48 cells the legend took half of the plots' height, and the buttons hid the first heading."""
+    page = tmp_path / "cells.html"
+    assert main(["report", str(SAMPLES / "made-48-cells.pcapng"), "-o", str(page)]) == 0
+    phone, desk = browse(page, tmp_path, width=500), browse(page, tmp_path, width=1280)
+    assert "cell 48</text>" not in phone
+    assert "cell 48</text>" in desk
+    assert 'class="modebar-btn"' not in phone
+    assert 'class="modebar-btn"' in desk
