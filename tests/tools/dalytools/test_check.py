@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
@@ -160,3 +162,18 @@ def test_constants_are_options(capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_was_not_compared_has_no_verdict(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["check", str(tmp_path / "none.pcapng")]) == 2
     assert capsys.readouterr().out == ""
+
+
+def test_the_verdict_stands_when_nobody_reads_the_table(tmp_path: Path) -> None:
+    """``check | head`` ended with status 1, which means that something was found, and wrote no --json."""
+    report = tmp_path / "found.json"
+    for wanted, fail_on in (0, "never"), (1, "note"):
+        words = ["check", "--no-dissector", "--fail-on", fail_on, "--json", report, FAULTS]
+        reader, writer = os.pipe()
+        os.close(reader)
+        line = [sys.executable, "-c", "from dalytools.cli import entry; entry()", *map(str, words)]
+        done = subprocess.run(line, stdout=writer, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+        os.close(writer)
+        assert (done.returncode, done.stderr) == (wanted, "")
+        assert json.loads(report.read_text("utf-8"))["status"] == wanted
+        report.unlink()

@@ -30,10 +30,17 @@ def console(out: TextIO, *, colour: bool | None = None) -> Console:
     """Return a console on `out`. colour: None: where it is a terminal that has it, and NO_COLOR is not set."""
     from rich.console import Console
 
+    class ToTheEnd(Console):
+        """One whose reader may go away (``| head``): what is left goes nowhere, and the verdict stays what it is."""
+
+        def on_broken_pipe(self) -> None:
+            self.quiet = True
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.file.fileno())
+
     terminal = out.isatty()
     if colour is None:
         colour = terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    made = Console(
+    made = ToTheEnd(
         file=out,
         highlight=False,
         markup=False,
