@@ -98,3 +98,15 @@ def test_damage_that_left_nothing_is_no_good_frame() -> None:
     note = {"what": "damaged", "time": 5.0}
     assert hidden(note, [heard(5.0, 1, 0x90)], [note])
     assert not hidden(note, [heard(6.0, 1, 0x90)], [note])
+
+
+def test_a_reply_that_two_speaking_at_once_left_whole_is_one() -> None:
+    note = {"what": "unanswered", "time": 1.0, "address": 3, "register": 0, "why": "damaged"}
+    collision = {"what": "collision", "time": 1.02, "heard": "a5209008" + "00" * 8 + "51" * 20}
+    asked, reply = Frame(1.0, 8, first=0x81, modbus=True), Frame(1.0325, 20, first=0x51, modbus=True)
+    assert hidden(note, [asked, Frame(1.02, 12, first=0xA5), reply], [note, collision])
+    assert not hidden(note, [asked, Frame(1.02, 32, first=0xA5)], [note, collision])
+    assert not hidden(note, [asked, reply._replace(modbus=False)], [note, collision])
+    assert not hidden(note, [asked, reply._replace(first=0x52)], [note, collision])
+    assert not hidden(note, [asked, reply._replace(seconds=1.1)], [note, collision])
+    assert not hidden(note, [asked, reply], [note])

@@ -25,7 +25,7 @@ LATER_S = 2.0
 """For so long at the most a late reply waits until the line is free."""
 SILENCE_S = 0.25
 NO_BOARD = frozenset((0x80, 0x20))
-D2 = 0xD2
+D2, ASKS_81, ANSWERS_81 = 0xD2, 0x80, 0x50
 RECENT_S = 10.0
 """How old the other side of a contradiction, and a request with a late reply, may be (docs/records.md 7, 11)."""
 TABLE_OF = {0x90: 0x95, 0x91: 0x95, 0x92: 0x96}
@@ -44,6 +44,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("unanswered", _is_error_frame, "its request is an error frame on CAN"),
         ("unanswered", _answered_otherwise, "another reply of this ID answers it (records.md 7)"),
         ("unanswered", _is_an_echo, "within 100 ms of the same request of another host: an echo (records.md 6)"),
+        ("unanswered", _left_whole, "two spoke at once, and its reply was left whole"),
         ("unanswered", exception_fits, "an exception of D2 fits each request that waits (wires.md 1)"),
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
@@ -88,6 +89,18 @@ def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
     near = between(heard, seconds - 0.114, seconds + 1e-6)
     same = [frame for frame in near if (frame.address, frame.data_id) == (note["address"], note.get("data_id"))]
     return len(same) > 1 and same[0].size == A5_SIZE
+
+
+def _left_whole(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether the reply to a request of Modbus is a good frame, though two spoke at once."""
+    asked = [frame for frame in between(heard, at(note) - 1e-6, at(note) + 1e-6) if frame.modbus]
+    collisions = [other for other in during(notes, at(note), at(note) + WAITS_S) if other["what"] == "collision"]
+    if not asked or not collisions:
+        return False
+    answers_from = asked[0].first if asked[0].first == D2 else asked[0].first - ASKS_81 + ANSWERS_81
+    length_s = len(str(collisions[0]["heard"])) / 2 / 960
+    both = between(heard, at(collisions[0]), at(collisions[0]) + length_s)
+    return any(frame.modbus and frame.first == answers_from for frame in both)
 
 
 def exception_fits(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
