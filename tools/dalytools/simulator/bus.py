@@ -22,7 +22,7 @@ from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, is_request
 from dalytools.simulator.harm import harmed, overlaid
 from dalytools.simulator.sent import Exchange, Sent
 from dalytools.simulator.stations import NEVER, LateReply, Station, stations
-from dalytools.simulator.truth import Truth
+from dalytools.simulator.truth import Fact, Truth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -224,7 +224,12 @@ class Bus:
             late = next((event for event in tricks if event.what == "late"), None)
             if late is not None:
                 due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
-                self._stations.append(LateReply(due, name, frames))
+                lies: list[dict[str, Fact]] = [
+                    {"board": number, "name": event.name, **_about(request)}
+                    for event in tricks
+                    if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]
+                ]
+                self._stations.append(LateReply(due, name, frames, lies))
                 self.truth.note(due, "late", board=number, delay_s=late.delay_ms / 1e3, **_about(request))
                 why = "late"
                 continue

@@ -108,7 +108,7 @@ NAMED = {"contradiction", "fault_present", "fault_raised"}
 STATES = {"mos_off_by_command", "charging_cabinet_offline"}
 """Bits that are no faults (docs/protocol.md, a.98)."""
 AGO_S = 1.5
-LONG_AGO_S = {"contradiction": 11.0, "burst-length": 20.0, "write-no-effect": 20.0}
+LONG_AGO_S = {"late": LATER_S, "contradiction": 11.0, "burst-length": 20.0, "write-no-effect": 20.0}
 OF_ANSWERS = {"cut_burst", "skipped_frame", "repeated_frame"}
 MOST_REPLY_S = 0.15
 """A simulated board begins to answer within that."""

@@ -110,3 +110,14 @@ def test_a_reply_that_two_speaking_at_once_left_whole_is_one() -> None:
     assert not hidden(note, [asked, reply._replace(first=0x52)], [note, collision])
     assert not hidden(note, [asked, reply._replace(seconds=1.1)], [note, collision])
     assert not hidden(note, [asked, reply], [note])
+
+
+def test_a_request_whose_first_bytes_are_of_a_frame_by_accident_is_none() -> None:
+    note = {"what": "unanswered", "time": 1.08, "address": 3, "register": 0}
+    damaged = {"what": "damaged", "time": 1.0}
+    accident, rest, asked = heard(1.0, 0x40, 0x95), Frame(1.082, 6, first=0), Frame(1.08, 8, first=0x81, modbus=True)
+    assert hidden(note, [accident, rest], [damaged, note])
+    assert not hidden(note, [accident, asked], [damaged, note])
+    assert not hidden(note, [accident, rest], [note])
+    assert not hidden(note, [Frame(1.0, 11, first=0xA5), rest], [damaged, note])
+    assert not hidden(note, [accident, Frame(1.03, 5), rest], [damaged, note])

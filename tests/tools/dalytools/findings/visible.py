@@ -44,6 +44,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("unanswered", _is_error_frame, "its request is an error frame on CAN"),
         ("unanswered", _answered_otherwise, "another reply of this ID answers it (records.md 7)"),
         ("unanswered", _is_an_echo, "within 100 ms of the same request of another host: an echo (records.md 6)"),
+        ("unanswered", _swallowed, "damage that is a good frame by accident took its first bytes"),
         ("unanswered", _left_whole, "two spoke at once, and its reply was left whole"),
         ("unanswered", exception_fits, "an exception of D2 fits each request that waits (wires.md 1)"),
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
@@ -89,6 +90,15 @@ def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
     near = between(heard, seconds - 0.114, seconds + 1e-6)
     same = [frame for frame in near if (frame.address, frame.data_id) == (note["address"], note.get("data_id"))]
     return len(same) > 1 and same[0].size == A5_SIZE
+
+
+def _swallowed(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether no packet begins where a request does, and the one before it is a good frame by accident."""
+    before = between(heard, at(note) - SILENCE_S, at(note) - 1e-6)
+    if not before or not before[-1].good or between(heard, at(note) - 1e-6, at(note) + 1e-6):
+        return False
+    first = before[-1].seconds
+    return any(other["what"] in {"damaged", "collision"} for other in during(notes, first - 1e-6, first + 1e-6))
 
 
 def _left_whole(note: Note, heard: list[Frame], notes: list[Note]) -> bool:

@@ -161,6 +161,20 @@ def test_another_board_that_just_woke_answers_with_zeros() -> None:
     assert all(note["time"] in zeros for note in other)
 
 
+def test_a_late_reply_may_say_what_others_do_not() -> None:
+    made = read_scenario("late-replies")
+    events = (
+        Event(8, "late", 1, data_id=0x90, delay_ms=1500),
+        Event(8, "contradict", 1, name="pack_voltage", data_id=0x90),
+    )
+    sent, notes = run(replace(made, events=events), 20)
+    (late,), (said,) = of(notes, "late"), of(notes, "contradiction")
+    assert (said["board"], said["name"], said["data_id"]) == (1, "pack_voltage", 0x90)
+    assert 0 < float(str(said["time"])) - float(str(late["time"])) < 0.5
+    lies = [piece for piece in replies(sent, 0x90) if piece.time_ns / 1e9 < float(str(said["time"]))][-2:]
+    assert int.from_bytes(lies[1].data[4:6]) > int.from_bytes(lies[0].data[4:6]) * 1.04
+
+
 def test_contradictions_are_in_single_replies() -> None:
     sent, notes = run(read_scenario("contradictions"), 90)
     said = of(notes, "contradiction")
