@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from dalytools.dashboard.told import FAULT, STATES
 from dalytools.dashboard.words import OLD, STALE_S, Value, aged, flow, said, span
+from dalytools.no_sensor import NO_SENSOR
 from dalytools.record_lines import STATES as DOING
 
 if TYPE_CHECKING:
@@ -99,9 +100,11 @@ def _temperatures(board: BoardTold) -> list[Value]:
     told = board.told
     values: list[Value] = []
     if sensors := told.get("daly.sensors.temperature"):
-        values += [Value(sensors, f"{number}: {value} C") for number, value in enumerate(sensors.all, 1)]
+        for number, value in enumerate(sensors.all, 1):
+            values.append(Value(sensors, f"{number}: none" if value in NO_SENSOR else f"{number}: {value} C"))
     elif (low := told.get("daly.temperature.min")) and (high := told.get("daly.temperature.max")):
-        values.append(Value(high, f"{low.number:.0f} to {high.number:.0f} C"))
+        there = [f"{one.number:.0f}" for one in (low, high) if one.number not in NO_SENSOR]
+        values.append(Value(high, f"{' to '.join(there)} C" if there else "no sensor"))
     for name, what in (("mos", "MOS"), ("board", "board"), ("heater", "heater")):
         if value := told.get(f"daly.temperature.{name}"):
             values.append(Value(value, f"{what}: {value.number:.0f} C"))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 from dalytools.field_names import FIELD_NAMES
+from dalytools.no_sensor import NO_SENSOR
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -211,7 +212,7 @@ def _columns() -> tuple[Column, ...]:
                 field=full,
                 several=name in _SEVERAL,
                 words=words.get(name),
-                nothing=frozenset((-40, 215)) if name in _NO_SENSOR else frozenset(),
+                nothing=NO_SENSOR if name in _NO_SENSOR else frozenset(),
                 hexadecimal=name in _HEXADECIMAL,
                 of_battery=name not in _OF_THE_RECORD and not name.startswith("modbus."),
             )

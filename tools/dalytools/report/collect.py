@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dalyref.kinds import Kind
+from dalytools.no_sensor import NO_SENSOR
 from dalytools.report.quantiles import Quantiles
 from dalytools.report.series import Counts, Series
 
@@ -173,7 +174,7 @@ class Collected:
         for field_name, what in LISTS.items():
             if field_name in fields:
                 for number, value in enumerate(_all(fields, field_name), 1):
-                    if isinstance(value, int | float):
+                    if isinstance(value, int | float) and not (what == "sensor" and value in NO_SENSOR):
                         board.add(f"{what} {number}", time, float(value))
         if "daly.fault_count" in fields:
             _take_faults(board, time, fields)

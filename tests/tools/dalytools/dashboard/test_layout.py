@@ -193,3 +193,12 @@ def test_messages_arrive_as_they_were() -> None:
 def test_paused() -> None:
     assert "p  go on" in plain(shown(State(), paused_s=3.2))
     assert "PAUSED 3 s" in plain(shown(State(), paused_s=3.2))
+
+
+def test_a_sensor_that_is_not_there_has_no_temperature(tmp_path: Path) -> None:
+    """Byte 00 is no sensor (field notes, a.92), and was shown as -40 C."""
+    sensors = a5(1, 0x96, bytes((1, 40 + 21, 0, 255)))
+    text = plain(shown(heard(tmp_path, [(0.5, a5(1, 0x94, bytes((4, 3)))), (0.5, sensors)])))
+    assert "Temp.   1: 21 C  2: none  3: none" in text
+    extremes = a5(1, 0x92, bytes((40 + 21, 1, 0, 2)))
+    assert "Temp.   21 C\n" in plain(shown(heard(tmp_path, [(0.5, extremes)])))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from tests.tools.dalytools.made import a5, write
 
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
@@ -146,3 +147,16 @@ def test_many_cells_leave_room_for_the_plots_on_a_phone(tmp_path: Path) -> None:
     assert "cell 48</text>" in desk
     assert 'class="modebar-btn"' not in phone
     assert 'class="modebar-btn"' in desk
+
+
+def test_a_sensor_that_is_not_there_has_no_line(tmp_path: Path) -> None:
+    """Bytes 00 and FF are no sensor (field notes, a.92), not -40 and 215 C; 61 is 21 C, 54 is 14 C."""
+    asked, told = a5(0x40, 0x96), a5(1, 0x96, bytes((1, 61, 0, 54, 255, 255, 255, 255)))
+    frames = [a5(1, 0x94, bytes((4, 4))), asked, told, asked, told]
+    path = write(tmp_path / "sensors.pcapng", [(number * 0.1, frame) for number, frame in enumerate(frames)])
+    assert main(["report", str(path), "-o", str(tmp_path / "sensors.html")]) == 0
+    drawn = {trace["name"]: trace["y"] for figure in figures(tmp_path / "sensors.html") for trace in figure["data"]}
+    assert {name: set(values) for name, values in drawn.items() if "sensor" in name} == {
+        "sensor 1": {21},
+        "sensor 3": {14},
+    }
