@@ -16,17 +16,19 @@ local M = {}
 
 local ONE_MORE_SEGMENT = 0x0FFFFFFF -- DESEGMENT_ONE_MORE_SEGMENT, which not every version gives Lua
 
-local stream_number, segment_length = Field.new("tcp.stream"), Field.new("tcp.len")
+local stream_number, segment_length, sequence = Field.new("tcp.stream"), Field.new("tcp.len"), Field.new("tcp.seq")
+local SEQUENCES = 2 ^ 32
 
 local capture -- options, buses by connection, results by slot (see daly_streams)
 local slots -- of frames, see feed()
 local held -- by bus and side: bytes that were undecided, and when they came; see begins()
+local fronts -- by packet: { raw = what we were handed, bytes = what Wireshark lost in front of it }; see front_of()
 local damaged -- by bus and side: whether the newest record is damaged
 
 --- Begin a capture. `with`: see daly_streams.capture.
 function M.init(with)
   capture = streams.capture(with)
-  slots, held, damaged = {}, {}, {}
+  slots, held, fronts, damaged = {}, {}, {}, {}
 end
 
 -- The bus of the connection, the same for both directions, and which end sent this packet. Wireshark numbers them,
@@ -67,23 +69,33 @@ local function cut(raw)
   return found, #cutter.buf
 end
 
--- When each byte came: a list of { at = position, time }. What a packet left undecided is handed to us again, before
--- the next bytes of its direction, as if it were theirs; unless bytes between were lost.
-local function begins(bus, side, raw, left, time)
-  local sides = held[bus] or {}
-  held[bus] = sides
-  local before, times = sides[side], {}
-  local fresh = segment_length()
-  if fresh and fresh.value == #raw then
-    before = nil -- nothing in front
+-- The undecided bytes of this direction that stand in front of `raw`, if any, and how many of them are not in it.
+-- Wireshark hands them to us again, as if they came with the next segment; not so where bytes between were lost, and
+-- where it takes a segment of one byte that comes again for a keep-alive (4.6 forgets then that we wait, though nothing
+-- is lost: sequence numbers tell).
+local function front_of(bus, side, raw)
+  local before = held[bus] and held[bus][side]
+  if not before then
+    return nil, 0
   end
-  if before and raw:sub(1, #before.bytes) == before.bytes then
-    times = before.times
-  else
-    before = nil
+  local length, lost = segment_length(), before.lost
+  if length and length.value == #raw then
+    local at = sequence()
+    if at and at.value == before.next then
+      return before, #before.bytes
+    end
+  elseif raw:sub(1, #before.bytes - lost) == before.bytes:sub(lost + 1) then
+    return before, lost
   end
+  return nil, 0
+end
+
+-- When each byte of `raw` came: a list of { at = position, time }. `before`: what was undecided and stands in it first;
+-- `left`: how many bytes at its end are undecided now, `lost` of `raw` are those that Wireshark does not know.
+local function begins(bus, side, raw, before, left, lost, time)
+  local sides, times = held[bus] or {}, before and before.times or {}
+  held[bus], sides[side] = sides, nil
   times[#times + 1] = { at = before and #before.bytes or 0, time = time }
-  sides[side] = nil
   if left > 0 then
     local first, kept = #raw - left, {}
     for i = 1, #times do
@@ -92,21 +104,25 @@ local function begins(bus, side, raw, left, time)
         kept[#kept + 1] = { at = math.max(0, times[i].at - first), time = times[i].time }
       end
     end
-    sides[side] = { bytes = raw:sub(first + 1), times = kept }
+    local length, at = segment_length(), sequence()
+    sides[side] = {
+      bytes = raw:sub(first + 1),
+      times = kept,
+      lost = math.max(0, lost - first),
+      next = length and at and (at.value + length.value) % SEQUENCES,
+    }
   end
   return times
 end
 
--- Tell the bus, once, about the frames among these records; they get their slots. What Wireshark hands us at once may
--- be cut otherwise when a packet is looked at again, so a frame is known by its packet, its bytes and its place among
--- equals.
-local function feed(items, raw, left, pinfo)
+-- Tell the bus, where it is given, about the frames among these records; they get their slots. What Wireshark hands us
+-- at once may be cut otherwise when a packet is looked at again, so a frame is known by its packet, its bytes and its
+-- place among equals.
+local function feed(items, raw, pinfo, bus, side, times)
   local number, results = pinfo.number, capture.results
   results.latest = math.max(results.latest, pinfo.rel_ts)
-  local bus, side, times, behind
-  if not pinfo.visited then
-    bus, side = bus_of(pinfo)
-    times = begins(bus, side, raw, left, pinfo.rel_ts)
+  local behind
+  if bus then
     damaged[bus] = damaged[bus] or {}
     behind = damaged[bus][side]
   end
@@ -117,7 +133,7 @@ local function feed(items, raw, left, pinfo)
       local bytes = raw:sub(item.at + 1, item.at + item.length)
       seen[bytes] = (seen[bytes] or 0) + 1
       local key = number .. " " .. seen[bytes] .. " " .. bytes
-      if not slots[key] and not pinfo.visited then
+      if not slots[key] and bus then
         capture.slots = capture.slots - 1
         slots[key] = capture.slots
         local began = 1
@@ -142,16 +158,34 @@ function M.dissect(buffer, pinfo, parent, handle)
   if length == 0 then
     return 0
   end
+  local bus, side, before, front
+  local lost = 0
+  if pinfo.visited then
+    local known = next(fronts) and fronts[pinfo.number]
+    local both = known and math.min(length, #known.raw) -- of what waits for more, a second look has nothing
+    front = known and raw:sub(1, both) == known.raw:sub(1, both) and known.bytes
+  else
+    bus, side = bus_of(pinfo)
+    before, lost = front_of(bus, side, raw)
+    if lost > 0 then
+      front = before.bytes:sub(1, lost)
+      fronts[pinfo.number] = { raw = raw, bytes = front }
+    end
+  end
+  if front then
+    raw = front .. raw
+    buffer = ByteArray.new(raw, true):tvb("With the bytes before")
+  end
   local items, left = cut(raw)
   if left > 0 then
     if pinfo.can_desegment > 0 then
-      pinfo.desegment_offset = length - left
+      pinfo.desegment_offset = math.max(0, length - left)
       pinfo.desegment_len = ONE_MORE_SEGMENT
     else
       items, left = records.alone(raw), 0
     end
   end
-  feed(items, raw, left, pinfo)
+  feed(items, raw, pinfo, bus, side, bus and begins(bus, side, raw, before, left, lost, pinfo.rel_ts))
   if #items == 0 then
     return length
   end
