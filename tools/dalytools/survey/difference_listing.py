@@ -38,7 +38,8 @@ def show(found: Difference, names: Sequence[str], console: Console) -> None:
             line("")
             line((heading, f"bold {style}"))
             for one in places:
-                newest = f": {one.stream.last.hex(' ').upper()}" if one.stream.last else ""
+                says = ", newest" if any(one.stream.moves.changed) else ":"
+                newest = f"{says} {one.stream.last.hex(' ').upper()}" if one.stream.last else ""
                 line((f"  {one.place.name}", _PLACE), f"   {spacing(one.stream)}{newest}")
     if found.changed:
         line("")
