@@ -6,7 +6,8 @@
     00 00 00 00 7D
     11/24/2026 10:00:01.18 [RX] - A5 01 90 08 ..
 
-A line without head goes on with the one before. Times are those of the first byte behind a change of direction.
+A line without head goes on with the one before. qModMaster's [TX] - 10:00:01 - A5 40 .. is read too.
+Times are those of the first byte behind a change of direction.
 """
 
 from __future__ import annotations
@@ -44,7 +45,12 @@ class Docklight(PlainLineLog):
             channel = found["channel"].upper()
             self._direction = OUT if channel.startswith("TX") else IN if channel.startswith("RX") else ""
             self._begun = True
-            data = hex_bytes(found["rest"]) if found["rest"].strip() else b""
+            rest = found["rest"]
+            if (
+                stamp is None and (later := split_stamp(rest))[0] and later[1].startswith("-")
+            ):  # [TX] - 12:34:56 - A5 40
+                stamp, rest = later[0], later[1].lstrip("- ")
+            data = hex_bytes(rest) if rest.strip() else b""
             return None if data is None else [Entry(data, stamp, self._direction)] if data else []
         if _NOTES.match(line):
             return []

@@ -34,12 +34,14 @@ _IN_WORDS = r"RX[DB]?|RECV|RECEIVED?|RECEIVING|READ(?:ING)?|IN|RES(?:P(?:ONSE)?)
 _WORD = rf"[\[(]?(?:(?P<out>{_OUT_WORDS})|(?P<in>{_IN_WORDS}))"
 _DIRECTION = re.compile(
     rf"[ \t]*{_WORD}(?:[ _]?(?:HEX|DATA|BYTES|FRAME))?(?:[ ]?[\[(]?\d+(?: bytes)?[\])]?)?"
-    r"(?=[\s\]):=>;,|]|$)[\])]?[ \t]*[:=>;,|]?[ \t]*",
+    r"(?=[\s\]):=>;,|]|$)[\])]?[ \t]*(?:[-=]{1,2}>|<[-=]{1,2}|[:=>;,|])?[ \t]*",
     re.IGNORECASE,
 )
 _LATER = re.compile(r"(?<=[\s:\])|-])[\[(]?(?:[A-Z]{2,9}|>{2,3}|<{2,3})(?=[\s:\])=])", re.IGNORECASE)
 _COMMENT = re.compile(r"\s*(?:#|//|;|--(?!-?>))")
 _ARROW = re.compile(r"(?P<arrow>-{1,3}>|=>|>)[ \t]")
+_COUNT = re.compile(r"(?P<hex>.*?)(?:\s*[\[(](?P<n>\d{1,4})(?: bytes)?[\])])?")
+_HEX = re.compile(r"\b([0-9A-Fa-f]{2})[hH]\b")
 _GAP = re.compile(r"[ \t]{2,}\|?|[ \t]*\|")
 _LABELS_LONG: Final = 200  # characters that may stand between time and direction
 _LABELLED: Final = 5  # bytes that a line must have, behind words of which only the last is known
@@ -144,12 +146,12 @@ class HexLines(PlainLineLog):
         """Read bytes in any of the ways: hex, in brackets or not, with their letters beside them or not; Python's."""
         text = text.strip().replace("<Buffer ", "<", 1)
         if text[:1] + text[-1:] in {"[]", "{}", "<>", "()"}:
-            text = text[1:-1].replace("][", " ")
+            text = text[1:-1].replace("][", " ").replace("}{", " ")
         if self._decimal:
             return decimal_bytes(text)
         data = hex_bytes(text)
         if data is None and len(text) <= _PICTURED:
-            data = _pictured(text)
+            data = _pictured(text) or _counted(text)
         if data is None and text.startswith(("b'", 'b"', "bytearray(", "bytes(")):
             data = literal_bytes(text)
         return data
@@ -159,6 +161,13 @@ def _surely_decimal(text: str) -> bool:
     """Whether bytes can't be in hex: several, and one has three digits."""
     data = decimal_bytes(text.strip().strip("[]{}()"))
     return data is not None and len(data) >= _LABELLED and max(data) > 99
+
+
+def _counted(text: str) -> bytes | None:
+    """Read bytes with how many there are behind them, or an h behind each: ``A5h 40h [2]``, ``A5 40 (2 bytes)``."""
+    found = _COUNT.fullmatch(text)
+    data = hex_bytes(_HEX.sub(r"\1", found["hex"])) if found else None
+    return data if found and data and found["n"] in {None, str(len(data))} else None
 
 
 def _pictured(text: str) -> bytes | None:

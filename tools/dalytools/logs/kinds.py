@@ -68,6 +68,8 @@ def guess(lines: list[str]) -> Guess | None:
             fit += entries is not None
         found += bool(log.finish())
         score = 4 * found + fit
+        if name == HexDump.name and found and fit == len(lines) > 1:  # offsets that all fit are none by chance
+            score = 6 * fit
         if found and score > best_score:
             best, best_score = Guess(name, fit, len(lines)), score
     return best

@@ -7,7 +7,7 @@
     1700000000.123456   1700000000   1700000000123              seconds since 1970; milli-, micro-, nanoseconds
     20261121123456   20261121T123456.789                        date and time of day without marks
     @4000000065f0a1b23b9ac9ff                                   TAI64N, of daemontools' multilog
-    0.004123   12.5s   [  12.345678]                            seconds since the log's beginning, with a fraction
+    0.004123   12.5s   4.123 ms   [  12.345678]                 seconds since the log's beginning, with a fraction
 
 A moment without a zone is taken as UTC. With slashes the month stands first, unless that can't be.
 """
@@ -36,7 +36,7 @@ _COMPACT = re.compile(
 )
 _UNIX = re.compile(_OPEN + r"(?P<u>1\d{9})(?:\.(?P<f>\d{1,9})|(?P<parts>\d{3}|\d{6}|\d{9}))?" + _END)
 _TAI = re.compile(r"@(?P<t>4[0-9a-f]{15})(?P<n>[0-9a-f]{8})[ \t]+")
-_START = re.compile(_OPEN + r"(?P<u>\d{1,7})\.(?P<f>\d{1,12})[ ]?s?" + _END)
+_START = re.compile(_OPEN + r"\+?(?P<u>\d{1,10})\.(?P<f>\d{1,12})(?:[ ]?(?P<unit>s|ms))?" + _END)
 
 _SECOND = 1_000_000_000
 _TAI_EPOCH = (1 << 62) + 10  # TAI64: seconds from 1970, TAI, which daemontools takes as ten ahead
@@ -59,7 +59,8 @@ def split_stamp(text: str) -> tuple[Stamp | None, str]:
         return Stamp("moment", int(found["u"]) * _SECOND + ns, step), text[found.end() :]
     if found := _START.match(text):
         ns, step = _fraction(found["f"])
-        return Stamp("start", int(found["u"]) * _SECOND + ns, step), text[found.end() :]
+        parts = 1000 if found["unit"] == "ms" else 1
+        return Stamp("start", (int(found["u"]) * _SECOND + ns) // parts, max(1, step // parts)), text[found.end() :]
     return None, text
 
 

@@ -108,6 +108,8 @@ def test_times_of_day_go_on_behind_midnight() -> None:
         ('"2026-11-21 12:34:56.10";"TX";"', '"2026-11-21 12:34:56.15";"RX";"', 50 * MS),
         ("2026-11-21 12:34:56.10 - bms - DEBUG - Sent 13 bytes: ", "2026-11-21 12:34:56.15 - bms - RX: ", 50 * MS),
         ("12:34:56\n", "12:34:57\n", SECOND),
+        ("+0.250 TX ", "+0.300 RX ", 50 * MS),
+        ("250.5 ms TX ", "300.5 ms RX ", 50 * MS),
         ("2026-11-21 12:34:56.100:\n", "2026-11-21 12:34:56.150:\n", 50 * MS),
     ],
 )
@@ -159,6 +161,9 @@ def test_bytes_beside_their_letters_and_in_brackets() -> None:
         f"{spaced(ANSWER[:8])}  {spaced(ANSWER[8:])}  |{shown}|\n",
         f"[{spaced(ANSWER)}]\n",
         f"RX: <Buffer {ANSWER.hex(' ')}>\n",
+        f"[12:34:56.789] Rx <- {spaced(ANSWER)} (13)\n",
+        f"RX: {' '.join(f'{byte:02X}h' for byte in ANSWER)} [13]\n",
+        f"{{{spaced(ANSWER, '}{')}}}\n",
         "".join(f"[{byte:02x}]" for byte in ANSWER),
     ):
         _, packets, importer = read(text)
@@ -212,6 +217,8 @@ def test_docklight() -> None:
     assert packets[1][0] - packets[0][0] == 8 * 10 * 10**9 // 9600
     assert packets[2] == (start + 180 * MS, "inbound", ANSWER)
     assert importer.tally.not_understood == 0
+    _, packets, _ = read(f"[TX] - 10:00:01 - {spaced(ASK)}\n[RX] - 10:00:02 - {spaced(ANSWER)}\n")  # qModMaster's
+    assert packets == [(10 * HOUR + SECOND, "outbound", ASK), (10 * HOUR + 2 * SECOND, "inbound", ANSWER)]
 
 
 def test_com_tools() -> None:
@@ -444,6 +451,34 @@ def test_hex_dumps() -> None:
         assert importer.tally.not_understood == 0
     _, packets, importer = read(xxd + "00000fff: 0102\n")
     assert importer.tally.not_understood == 1  # it does not go on there
+
+
+def test_dumps_of_words_in_octal_and_of_packets() -> None:
+    """hexdump without -C prints words, the low byte first: read as bytes, each pair was swapped."""
+    data = ASK + ANSWER + bytes(40) + b"\x01"  # 67: an odd number, so the last word is filled up
+    even = data + b"\0"
+
+    def dumped(offset: str, step: int) -> str:
+        lines = [f"{at:{offset}}" for at in range(0, len(data), 16)]
+        parts = [even[at : at + 16] for at in range(0, len(data), 16)]
+        if step == 2:
+            shown = [" ".join(part[n : n + 2][::-1].hex() for n in range(0, len(part), 2)) for part in parts]
+        else:
+            shown = [data[at : at + 16].hex(" ") for at in range(0, len(data), 16)]
+        text = "".join(f"{at} {part}\n" for at, part in zip(lines, shown, strict=True))
+        return text.replace(lines[3] + " " + shown[3] + "\n", "*\n") + f"{len(data):{offset}}\n"
+
+    assert " 40a5 0890 " in dumped("07x", 2)
+    for text in (dumped("07x", 2), dumped("07o", 2), dumped("07o", 1), dumped("06x", 1)):
+        kind, packets, importer = read(text)
+        assert kind == "hexdump"
+        assert b"".join(part for *_, part in packets) == data
+        assert importer.tally.not_understood == 0
+    packet = "0000   {}   ........\n"
+    for text in (packet, "0000  {}\n"):
+        kind, packets, _ = read(text.format(ASK.hex(" ")) + "\n" + text.format(ANSWER.hex(" ")))
+        assert (kind, b"".join(part for *_, part in packets)) == ("hexdump", ASK + ANSWER)
+    assert read("A540 9008 0000\n")[0] == "hex"
 
 
 def test_a_dump_with_half_a_byte_is_not_understood() -> None:

@@ -149,8 +149,10 @@ def test_two_captures_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_what_moved_in_one_alone_is_shown_as_the_newest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = str(Bus(60).write(tmp_path / "a.pcapng", {}))
-    after = {0xE0: lambda poll: bytes((poll, *bytes(7))), 0xE1: lambda _: b"\x05" + bytes(7)}
-    assert main(["survey", "--diff", before, str(Bus(60).write(tmp_path / "b.pcapng", after)), "--id", "E0-E1"]) == 0
+    after = Bus(60).write(
+        tmp_path / "b.pcapng", {0xE0: lambda poll: bytes((poll, *bytes(7))), 0xE1: lambda _: b"\x05" + bytes(7)}
+    )
+    assert main(["survey", "--diff", before, str(after), "--id", "E0-E1"]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if "reply" in line]
     assert lines[0].endswith(", newest 3B 00 00 00 00 00 00 00")  # 59, the last of 60
     assert lines[1].endswith("): 05 00 00 00 00 00 00 00")
