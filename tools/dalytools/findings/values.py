@@ -133,14 +133,17 @@ class Values(Watch):
 
     def _of_zeros(self, record: Decoded, bus: str, fields: Fields) -> None:
         """Follow replies of nothing but zeros: right for some IDs, but not in a row with one where they can't be."""
-        place = _board(record, bus)
-        if fields.get("daly.dialect") != "a5":
-            if _nothing(fields):
+        place, a5 = _board(record, bus), fields.get("daly.dialect") == "a5"
+        nothing = not a5 and _nothing(fields)
+        if not a5 and (place.board is None or not (nothing or "daly.pack.voltage" in fields)):
+            if nothing:
                 self._zero[place].add(record.number, record.time_ns)
             return
         run = self._runs[place]
         self._cleared(place, run.replies_at(record.time_ns))
-        zero = run.reply(str(fields.get("daly.data", "")), fields.get("daly.data_id"))
+        zero = (
+            run.reply(str(fields.get("daly.data", "")), fields.get("daly.data_id")) if a5 else run.state(zero=nothing)
+        )
         if zero is None:
             run.waiting.append((record.number, record.time_ns))
         elif not zero:

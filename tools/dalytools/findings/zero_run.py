@@ -87,6 +87,13 @@ class ZeroRun:
         self.waiting.clear()
         return went
 
+    def state(self, *, zero: bool) -> bool:
+        """Take a reply of the same board in Modbus that tells its state, and whether that is zero; return the same."""
+        self._unanswered = 0
+        self.proven = self.proven or zero
+        self._awake = self._awake or not zero
+        return zero
+
     def reply(self, data: str, data_id: object) -> bool | None:
         """Take a reply's eight bytes (hex): whether it is zero for sure. None: it may be true, and waits."""
         self._unanswered = 0

@@ -207,7 +207,7 @@ class Bus:
             tricks = self._tricks_on(number, request)
             asleep, zero = board.asleep, board.zero_replies_left
             board.lies = {event.name for event in tricks if event.what == "contradict"}
-            stranger = next((event for event in tricks if event.what == "other_board"), None)
+            stranger = None if asleep else next((event for event in tricks if event.what == "other_board"), None)
             answer = board.answer(self._meant_for(number, request) if stranger else request)
             board.lies = set()
             if answer is None:
@@ -239,7 +239,7 @@ class Bus:
                 self.truth.note(self.now_ns, "echo", **_about(request), address=request[1])
             elif zero:
                 self.truth.note(self.now_ns, "zero_reply", board=number, **_about(request))
-            if stranger and not asleep:  # of zeros or not
+            if stranger:  # of zeros or not
                 self.truth.note(self.now_ns, "other_board", board=number, asked=request[1] - 0x3F, **_about(request))
             harm = next((event for event in tricks if event.what == "damage"), None)
             whole, some = self._speak(name, frames, sent, harm, silent_from_ns=quiet_from)

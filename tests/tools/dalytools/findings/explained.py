@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tests.tools.dalytools.findings.heard import BURSTS, SLOTS, Frame, between, tables
+from tests.tools.dalytools.findings.heard import A5_SIZE, BURSTS, DALYS_MODBUS, SLOTS, Frame, between, tables
 from tests.tools.dalytools.findings.moments import at, during
 from tests.tools.dalytools.findings.own_answers import answers
 from tests.tools.dalytools.findings.visible import LONGEST_S, RECENT_S, WAITS_S, exception_fits, same_request, there_at
@@ -42,8 +42,11 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
             note["what"] == "unanswered" and "register" in note and exception_fits(note, heard, notes)
             for note in during(notes, seconds - WAITS_S, seconds)
         )
-    if moment.rule in {"unanswered", "silent"} and (
-        _harmed(moment, notes) or _newer_is_answered(moment, heard, notes) or _second_answer(moment, heard, notes)
+    if moment.rule in {"unanswered", "silent", "asleep"} and (
+        _harmed(moment, heard, notes)
+        or _other_fits(moment, heard, notes)
+        or _newer_is_answered(moment, heard, notes)
+        or _second_answer(moment, heard, notes)
     ):
         return True
     if moment.rule == "zero-reply" and _behind_zeros(moment, heard, notes):
@@ -52,7 +55,7 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
         return True
     return any(
         _tells(accident, moment, heard)
-        for note in during(notes, seconds - ago, seconds + 1e-3)
+        for note in during(notes, seconds - ago, seconds + A5_SIZE / 960)
         if note["what"] in {"damaged", "collision"} and note.get("harmed") is not False
         for accident in there_at(note, heard)
         # The one right before it is whole.
@@ -104,22 +107,41 @@ def _counts_from_one(moment: Moment, heard: list[Frame], notes: list[Note]) -> b
     return False
 
 
-def _harmed(moment: Moment, notes: list[Note]) -> bool:
+def _harmed(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
     """Tell whether bytes of that exchange were harmed, though a good frame of it is among what was heard.
 
     The boards heard no good request, or on CAN the whole of it is an error frame.
     """
+    asked = [frame for frame in between(heard, moment.seconds - 1e-6, moment.seconds + 1e-6) if frame.asks]
+    data_id = asked[0].data_id if asked else moment.place.data_id
     return any(
         note["what"] in {"damaged", "collision"}
         and note.get("harmed") is not False
-        and _begins(bytes.fromhex(str(note.get("sent", note["heard"]))), moment.place.data_id)
+        and _begins(bytes.fromhex(str(note.get("sent", note["heard"]))), data_id, moment.place.register)
         for note in during(notes, moment.seconds - 1e-3, moment.seconds + WAITS_S)
     )
 
 
-def _begins(data: bytes, data_id: int | None) -> bool:
-    """Tell whether an A5 frame of that ID begins in these bytes."""
-    return any(data[place] == 0xA5 and data[place + 2] == data_id for place in range(len(data) - 2))
+def _begins(data: bytes, data_id: int | None, register: int | None) -> bool:
+    """Tell whether an A5 frame of that ID begins in these bytes, or a frame of Modbus for that register."""
+    return any(
+        (data[place] == 0xA5 and data[place + 2] == data_id)
+        or (data[place] in DALYS_MODBUS and int.from_bytes(data[place + 2 : place + 4]) == register)
+        for place in range(len(data) - 3)
+    )
+
+
+def _other_fits(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it was answered with an exception that fits another request of D2 as well (wires.md 1)."""
+    answered = [note for note in during(notes, moment.seconds - 1e-3, moment.seconds + 1e-3) if _is_exception(note)]
+    return bool(answered) and any(
+        note["what"] == "unanswered" and "register" in note and exception_fits(note, heard, answered)
+        for note in during(notes, moment.seconds - WAITS_S, moment.seconds)
+    )
+
+
+def _is_exception(note: Note) -> bool:
+    return note["what"] == "modbus_exception"
 
 
 def _second_answer(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:

@@ -16,7 +16,7 @@ from tests.tools.dalytools.findings.explained import explained
 from tests.tools.dalytools.findings.heard import Frame, frames
 from tests.tools.dalytools.findings.injected import search
 from tests.tools.dalytools.findings.moments import Moment, Note, at, during
-from tests.tools.dalytools.findings.visible import LATER_S, hidden, sent_by
+from tests.tools.dalytools.findings.visible import LATER_S, LONGEST_S, hidden, sent_by
 
 from dalytools.findings.finding import Finding, Severity, Tally
 from dalytools.simulator.capture_file import write_capture
@@ -59,7 +59,8 @@ FOUND_BY = {
     "write": Rule(("write",), 0.01, 0.01),
     "fault_present": Rule(("fault-standing",), 0.3, 0.3),
     "fault_raised": Rule(("fault-raised",), 0.3, 0.3),
-    "foreign": Rule(("foreign",), 0.01, 0.3),
+    # Several exchanges end to end are one record.
+    "foreign": Rule(("foreign",), LONGEST_S, 0.3),
 }
 PLANTED = {
     name.replace("-", "_"): Rule((name,), 0.01, 0.2)

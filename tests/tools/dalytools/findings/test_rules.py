@@ -470,6 +470,31 @@ def test_faults_that_zeros_seemed_to_clear_were_there_all_the_time(tmp_path: Pat
     assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
 
 
+def _of_81(*, volts: bool) -> list[Heard]:
+    """A read of 0038 to 003A in 81: 19.8 V, 0 A, 38.5 %; or zeros."""
+    state = "00c675300181" if volts else "00" * 6
+    return [Heard(7, rtu("810300380003")), Heard(7.05, rtu(f"510306{state}"))]
+
+
+@pytest.mark.parametrize(("volts", "of_waking"), [(False, 4), (True, 0)])
+def test_what_a_board_says_in_81_tells_whether_its_zeros_are_true(volts: bool, of_waking: int, tmp_path: Path) -> None:
+    """Two replies that may be true in A5, its state in 81, and one more."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        *asked(5, 0x97, a5(1, 0x97)),
+        *asked(6, 0x98, FINE),
+        *_of_81(volts=volts),
+        *asked(8, 0x97, a5(1, 0x97)),
+        *asked(9, 0x90, PACK),
+    ]
+    found = [
+        finding
+        for finding in search(capture(tmp_path / "81.pcapng", [*packets, *LATER]))
+        if finding.rule == "zero-reply"
+    ]
+    assert sum(finding.tally.count for finding in found) == of_waking
+
+
 def test_zeros_that_are_true_end_a_fault_that_other_zeros_seemed_to_clear(tmp_path: Path) -> None:
     """It wakes with zeros; then, awake, it has no fault; and then one comes again."""
     packets = [

@@ -52,6 +52,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
         ("collision", _good_by_accident, "its bytes are a good frame by accident"),
         ("foreign", _gap_is_mixed, "damaged bytes in the same gap, which so is not whole theirs (records.md 4)"),
+        ("repeated_frame", _cut_before, "the burst was cut off before the frame came again"),
         ("repeated_frame", _comes_once, "one of the two frames was damaged"),
         ("cut_burst", _nothing_came, "what came of it was damaged"),
         ("late", _nothing_came, "what came of it was damaged"),
@@ -143,14 +144,16 @@ def sent_by(note: Note, board: int) -> bool:
 
 
 def _is_of(frame: Frame, note: Note) -> bool:
-    """Tell whether it is a reply of a note's board and ID."""
+    """Tell whether it is a reply of a note's board and ID; of Modbus, a good frame that its board may have sent."""
+    if "register" in note:
+        return frame.modbus and frame.first in {D2, ANSWERS_81 + int(str(note["board"]))}
     return (frame.address, frame.data_id) == (note["board"], note["data_id"])
 
 
 def _nothing_came(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     """Tell whether no frame of it was heard well, for damage."""
     soon = between(heard, at(note) - 1e-3, at(note) + LONGEST_S)
-    return "data_id" in note and not any(_is_of(frame, note) for frame in soon) and _board_was_damaged(note, notes)
+    return not any(_is_of(frame, note) for frame in soon) and _board_was_damaged(note, notes)
 
 
 def _board_was_damaged(note: Note, notes: list[Note]) -> bool:
@@ -186,8 +189,10 @@ def _gap_is_mixed(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
         last += 1
     until = heard[last + 1].seconds if last + 1 < len(heard) and _follows(heard, last) else heard[last].ends + SILENCE_S
     return any(
-        other["what"] in {"damaged", "collision"} and other.get("harmed") is not False
-        for other in during(notes, heard[first].seconds - 1e-3, until + 1e-3)
+        other["what"] in {"damaged", "collision"}
+        and other.get("harmed") is not False
+        and at(other) + len(str(other.get("heard", ""))) / 2 / 960 > heard[first].seconds - 1e-3
+        for other in during(notes, heard[first].seconds - LONGEST_S, until + 1e-3)
     )
 
 
@@ -210,6 +215,17 @@ def _cancelled(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     same = ("time", "board", "data_id", "frame")
     both = any(one["what"] == other and all(one[key] == note[key] for key in same) for one in notes)
     return both and len(_of_number(note, heard)) == 1
+
+
+def _cut_before(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    same = ("time", "board", "data_id")
+    cut = any(
+        other["what"] == "cut_burst"
+        and all(other[key] == note[key] for key in same)
+        and int(str(other["sent"])) <= int(str(note["frame"]))
+        for other in notes
+    )
+    return cut and len(_of_number(note, heard)) == 1
 
 
 def _comes_once(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
