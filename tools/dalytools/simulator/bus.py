@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import random
 from datetime import UTC, datetime
+from functools import partial
 from typing import TYPE_CHECKING
 
 from dalytools.simulator import modbus
@@ -22,7 +23,7 @@ from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, is_request
 from dalytools.simulator.harm import harmed, overlaid
 from dalytools.simulator.sent import Exchange, Sent
 from dalytools.simulator.stations import NEVER, LateReply, Station, stations
-from dalytools.simulator.truth import Fact, Truth
+from dalytools.simulator.truth import Truth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -224,12 +225,9 @@ class Bus:
             late = next((event for event in tricks if event.what == "late"), None)
             if late is not None:
                 due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
-                lies: list[dict[str, Fact]] = [
-                    {"board": number, "name": event.name, **_about(request)}
-                    for event in tricks
-                    if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]
-                ]
-                self._stations.append(LateReply(due, name, frames, lies))
+                faults = board.battery.reading.faults
+                said = partial(self._note_said, number, request, frames, tricks, None if zero else faults)
+                self._stations.append(LateReply(due, name, frames, said))
                 self.truth.note(due, "late", board=number, delay_s=late.delay_ms / 1e3, **_about(request))
                 why = "late"
                 continue
@@ -245,14 +243,14 @@ class Bus:
             whole, some = self._speak(name, frames, sent, harm, silent_from_ns=quiet_from)
             if asleep:
                 why = "echo" if whole else "damaged"
-            elif some and not stranger:
+            elif stranger:
+                if whole and not zero:
+                    self._note_faults_seen(number, request, frames, board.battery.reading.faults)
+            elif some:
                 good, complete = True, whole
-                for event in tricks:
-                    if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]:
-                        self.truth.note(self.now_ns, "contradiction", board=number, name=event.name, **_about(request))
-                if self.truth.on and whole and not zero:
-                    self._note_faults_seen(number, request, frames)
-            elif not stranger:
+                faults = board.battery.reading.faults
+                self._note_said(number, request, frames, tricks, faults if whole and not zero else None)
+            else:
                 why = "damaged"
         return good, complete, why
 
@@ -421,8 +419,20 @@ class Bus:
             facts = {"dialect": dialect, "register": int.from_bytes(request[2:4]), "value": request[4:-2].hex()}
         self.truth.note(at_ns, "write", host=sender, **facts, result=result if reply else "none")
 
-    def _note_faults_seen(self, number: int, request: bytes, frames: list[bytes]) -> None:
+    def _note_said(
+        self, number: int, request: bytes, frames: list[bytes], tricks: list[Event], faults: frozenset[str] | None
+    ) -> None:
+        """Note what a good reply says: contradictions, and faults where it tells them (None: it does not)."""
+        for event in tricks:
+            if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]:
+                self.truth.note(self.now_ns, "contradiction", board=number, name=event.name, **_about(request))
+        if faults is not None:
+            self._note_faults_seen(number, request, frames, faults)
+
+    def _note_faults_seen(self, number: int, request: bytes, frames: list[bytes], faults: frozenset[str]) -> None:
         """Note what a good reply with the fault bits tells that the one before it did not."""
+        if not self.truth.on:
+            return
         if request[0] == START:
             if request[2] != 0x98 or frames[0][2] != 0x98:
                 return
@@ -434,7 +444,6 @@ class Bus:
             if asked.register > 0x3A or asked.register + asked.count < 0x3E:
                 return
             key = ("d2", number)
-        faults = self.boards[number].battery.reading.faults
         before = self._seen_faults.get(key)
         self._seen_faults[key] = faults
         changes = [("fault_present" if before is None else "fault_raised", faults - (before or frozenset()))]

@@ -10,11 +10,12 @@ from dalytools.simulator.board import frame
 from dalytools.simulator.scenario import HOST_BASE
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from random import Random
 
     from dalytools.simulator.scenario import Event, Foreign, Host, Scenario
     from dalytools.simulator.sent import Exchange, Sent
-    from dalytools.simulator.truth import Fact, Truth
+    from dalytools.simulator.truth import Truth
 
 NEVER: Final = 1 << 62  # ns
 APP_READS: Final = {"d2": ((0x00, 0x3E), (0x80, 0x29), (0xA9, 0x20)), "81": ((0x00, 0x40), (0x41, 0x3E), (0x178, 0x4A))}
@@ -165,12 +166,12 @@ class LateReply:
 
     listens = True
 
-    def __init__(self, due_ns: int, name: str, frames: list[bytes], lies: list[dict[str, Fact]]) -> None:
-        """lies: what to note as contradictions when it is said."""
+    def __init__(self, due_ns: int, name: str, frames: list[bytes], said: Callable[[], None]) -> None:
+        """said: to be called when it was said, and heard well."""
         self.due_ns = due_ns
         self._name = name
         self._frames = frames
-        self._lies = lies
+        self._said = said
 
     def speak(self, bus: Pair) -> list[Sent]:
         """Say it now."""
@@ -178,8 +179,7 @@ class LateReply:
         for data in self._frames:
             sent += bus.say(data, self._name)
         if any(piece.data in self._frames for piece in sent):
-            for lie in self._lies:
-                bus.truth.note(bus.now_ns, "contradiction", **lie)
+            self._said()
         self.due_ns = NEVER
         return sent
 

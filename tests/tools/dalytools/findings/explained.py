@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING
 from tests.tools.dalytools.findings.heard import A5_SIZE, BURSTS, DALYS_MODBUS, SLOTS, Frame, between, tables
 from tests.tools.dalytools.findings.moments import at, during
 from tests.tools.dalytools.findings.own_answers import answers
-from tests.tools.dalytools.findings.visible import LONGEST_S, RECENT_S, WAITS_S, exception_fits, same_request, there_at
+from tests.tools.dalytools.findings.visible import (
+    ECHOES_S,
+    LONGEST_S,
+    RECENT_S,
+    WAITS_S,
+    exception_fits,
+    same_request,
+    there_at,
+)
 
 if TYPE_CHECKING:
     from tests.tools.dalytools.findings.moments import Moment, Note
@@ -33,7 +41,7 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
     """Tell whether the bytes say it. ago: how long before it what counts then may have come, s."""
     seconds = moment.seconds
     if moment.rule == "echo":
-        return any(
+        return _repeats_a_collision(moment, heard, notes) or any(
             note["what"] == "unanswered" and note.get("why") == "busy" and same_request(note, seconds, heard)
             for note in during(notes, seconds - 1e-3, seconds + 1e-3)
         )
@@ -60,6 +68,15 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
         for accident in there_at(note, heard)
         # The one right before it is whole.
         if accident.good and max(accident.seconds, accident.ends - 2e-4) > at(note) - 1e-4
+    )
+
+
+def _repeats_a_collision(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it repeats within 100 ms what another host said at once with somebody, and which is whole."""
+    near = between(heard, moment.seconds - ECHOES_S, moment.seconds + 1e-6)
+    same = [frame for frame in near if (frame.address, frame.data_id) == (near[-1].address, near[-1].data_id)]
+    return len(same) > 1 and any(
+        note["what"] == "collision" for note in during(notes, same[0].seconds - 1e-3, same[0].seconds + 1e-3)
     )
 
 

@@ -68,6 +68,42 @@ def test_an_echo_is_explained_by_the_same_request_of_another_host() -> None:
     assert not explained(counted("echo", 1.03, board=4), both, [{**note, "why": "silent"}], 1.5)
 
 
+def test_an_echo_is_explained_by_the_same_request_said_into_another_frame() -> None:
+    note = {"what": "collision", "time": 1.0, "heard": "ff" * 20, "harmed": True}
+    both = [heard(1.0, 0x47, 0x90), heard(1.05, 0x47, 0x90)]
+    assert explained(counted("echo", 1.05, board=8), both, [note], 1.5)
+    assert not explained(counted("echo", 1.05, board=8), both, [{**note, "time": 1.05}], 1.5)
+    assert not explained(counted("echo", 1.05, board=8), both, [], 1.5)
+    assert not explained(counted("echo", 1.05, board=8), [heard(1.0, 0x47, 0x91), both[1]], [note], 1.5)
+
+
+def test_harm_to_a_request_of_modbus_that_was_left_whole_explains_it_too() -> None:
+    asked = Frame(1.0, 8, first=0x8C, modbus=True)
+    note = {"what": "collision", "time": 1.0, "heard": "8c030178004a5b05209308", "harmed": True}
+    says = Moment("unanswered", Place(board=12, register=0x178), Severity.WARNING, 1.0)
+    assert explained(says, [asked], [note], 1.5)
+    assert not explained(says, [asked], [{**note, "heard": "8c030000004a5b05209308"}], 1.5)
+    assert not explained(says, [asked], [{**note, "harmed": False}], 1.5)
+
+
+def test_an_exception_that_fits_another_request_too_leaves_both_unanswered() -> None:
+    first, second = (Frame(seconds, 8, first=0xD2, modbus=True) for seconds in (0.6, 1.0))
+    waits = {"what": "unanswered", "time": 0.6, "address": 3, "register": 0, "why": "damaged"}
+    exception = {"what": "modbus_exception", "time": 1.0}
+    says = Moment("unanswered", Place(address=0xD2, register=0xF0F0), Severity.WARNING, 1.0)
+    assert explained(says, [first, second], [waits, exception], 1.5)
+    assert not explained(says, [first, second], [exception], 1.5)
+    assert not explained(says, [first, second], [waits], 1.5)
+    assert not explained(says, [first._replace(first=0x81), second], [waits, exception], 1.5)
+
+
+def test_a_sleep_is_explained_by_harm_to_the_request_that_it_counts() -> None:
+    note = {"what": "damaged", "time": 1.05, "sent": "a504980800000000", "heard": "80a504980800000000"}
+    says = counted("asleep", 1.0, board=4)
+    assert explained(says, [heard(1.0, 0x43, 0x98)], [note], 1.5)
+    assert not explained(says, [heard(1.0, 0x43, 0x90)], [note], 1.5)
+
+
 def test_an_unanswered_request_is_explained_by_a_newer_one_that_took_its_reply() -> None:
     older, newer, reply = heard(1.0, 0x40, 0x90), heard(1.03, 0x20, 0x90), heard(1.08, 1, 0x90)
     note = {"what": "unanswered", "time": 1.03, "why": "busy", "address": 0x20, "data_id": 0x90}

@@ -121,3 +121,21 @@ def test_a_request_whose_first_bytes_are_of_a_frame_by_accident_is_none() -> Non
     assert not hidden(note, [accident, rest], [note])
     assert not hidden(note, [Frame(1.0, 11, first=0xA5), rest], [damaged, note])
     assert not hidden(note, [accident, Frame(1.03, 5), rest], [damaged, note])
+
+
+def test_a_frame_that_comes_again_behind_the_cut_does_not() -> None:
+    note = {"what": "repeated_frame", "time": 1.0, "board": 1, "data_id": 0x95, "frame": 2}
+    cut = {"what": "cut_burst", "time": 1.0, "board": 1, "data_id": 0x95, "sent": 2, "of": 4}
+    burst = [heard(1.05, 1, 0x95, "01"), heard(1.0636, 1, 0x95, "02")]
+    assert hidden(note, burst, [note, cut])
+    assert not hidden(note, burst, [note, {**cut, "sent": 3}])
+    assert not hidden(note, [*burst, heard(1.0771, 1, 0x95, "02")], [note, cut])
+
+
+def test_a_late_reply_of_modbus_that_was_damaged_is_hidden() -> None:
+    note = {"what": "late", "time": 5.0, "board": 5, "register": 0}
+    damaged = {"what": "damaged", "time": 5.0, "sender": "board 5"}
+    reply = Frame(5.0, 133, first=0x55, modbus=True)
+    assert hidden(note, [reply._replace(modbus=False)], [note, damaged])
+    assert not hidden(note, [reply], [note, damaged])
+    assert not hidden(note, [reply._replace(modbus=False)], [note])

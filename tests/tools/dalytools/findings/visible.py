@@ -19,6 +19,8 @@ WAITS_S = 1.03
 """A request's 13.5 ms, and the second that it waits (docs/records.md 6)."""
 LONGEST_S = 0.3
 """Of a frame at 9600 baud: 261 bytes."""
+ECHOES_S = 0.114
+"""A request's 13.5 ms, and the 100 ms within which a repeat is an echo (docs/records.md 6)."""
 LATE_S = 0.5
 """From when on ``check`` calls a reply late."""
 LATER_S = 2.0
@@ -88,7 +90,7 @@ def _is_an_echo(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
 
 def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
     """Tell whether a second host with the same address asked the same within 100 ms; on a serial line alone."""
-    near = between(heard, seconds - 0.114, seconds + 1e-6)
+    near = between(heard, seconds - ECHOES_S, seconds + 1e-6)
     same = [frame for frame in near if (frame.address, frame.data_id) == (note["address"], note.get("data_id"))]
     return len(same) > 1 and same[0].size == A5_SIZE
 

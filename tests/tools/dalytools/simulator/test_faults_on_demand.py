@@ -175,6 +175,18 @@ def test_a_late_reply_may_say_what_others_do_not() -> None:
     assert int.from_bytes(lies[1].data[4:6]) > int.from_bytes(lies[0].data[4:6]) * 1.04
 
 
+def test_faults_that_a_late_reply_tells_are_noted_with_it() -> None:
+    events = (
+        Event(6, "fault", 1, name="eeprom"),
+        Event(6, "late", 1, data_id=0x98, delay_ms=1500),
+        Event(6.5, "clear", 1, name="eeprom"),
+    )
+    _, notes = run(replace(read_scenario("faults"), events=events), 30)
+    (late,), (raised,) = of(notes, "late"), of(notes, "fault_raised")
+    assert raised["name"] == "eeprom"
+    assert 0 < float(str(raised["time"])) - float(str(late["time"])) < 0.5
+
+
 def test_contradictions_are_in_single_replies() -> None:
     sent, notes = run(read_scenario("contradictions"), 90)
     said = of(notes, "contradiction")
