@@ -13,7 +13,7 @@ local M = {}
 
 local byte, char, sub, concat = string.byte, string.char, string.sub, table.concat
 local GRACE = exchange.GRACE
-local later = results_module.later
+local later, note_table = results_module.later, results_module.note_table
 
 -- IDs that answer in several numbered frames, and the highest number with base 1 (texts: none is known).
 local IDS = {
@@ -132,19 +132,14 @@ end
 local function link_parts(bus, burst, number)
   burst.table_in = number
   for i = 1, #burst.parts do
-    local slot = burst.parts[i]
-    if bus.results.wait[slot] then -- a response time
-      later(bus, "whole_in", slot, number)
-    else
-      later(bus, "wait", slot, -number)
-    end
+    note_table(bus, burst.parts[i], number)
   end
   burst.parts = {}
 end
 
 --- A reply that is one of several frames. `damaged`: what stands right before it in its stream is. Returns, each nil
--- where there is none: packet of its request; response time, or minus the packet of the burst's table; what it is shown
--- with; the table.
+-- where there is none: packet of its request; response time; what it is shown with; the table; the packet of the burst's
+-- table, where that came before.
 function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   local state = bus.state
   local number = byte(raw, 5)
@@ -220,14 +215,15 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   if missing or again then
     memory = { burst = M.open(memory), missing = missing, again = again, table = list }
   end
-  if burst.table_in then
-    wait = -burst.table_in
+  local table_in = burst.table_in
+  if table_in then
+    wait = nil
   elseif list then
     link_parts(bus, burst, packet)
   elseif burst.count then
     burst.parts[#burst.parts + 1] = slot
   end
-  return burst.request, wait, memory, list
+  return burst.request, wait, memory, list, table_in
 end
 
 --- The characters of a text burst, without the padding at its end.
@@ -241,18 +237,18 @@ end
 
 --- The packet in which the whole of a frame's burst stands, or nil; `again`: the capture was read to its end.
 function M.whole_in(results, slot, again)
-  local wait = results.wait[slot]
-  if wait and wait < 0 then
-    return -wait
+  local table_in = results_module.table_in(results, slot)
+  if table_in and (again or not results_module.wait(results, slot)) then
+    return table_in
   end
-  local burst = M.open(results.memory[slot])
+  local burst = M.open(results_module.memory(results, slot))
   if not again or not burst then
     return nil
   end
   if burst.last and not burst.count and burst.whole then
     return burst.last ~= slot and (burst.values or M.text(burst) ~= "") and burst.last_in or nil
   end
-  return results.whole_in[slot]
+  return nil
 end
 
 --- Whether a frame is the last of a burst that was cut off: it ended and its last cell or sensor was not reached.

@@ -8,8 +8,8 @@
 --
 --        --Modbus---> daly_modbus_board                      registers, what changed; daly_modbus_exchange the request
 --
--- feed() is called once per frame, in the order of the capture. What it finds out is kept in daly_results' columns,
--- so that an ordinary frame costs no table.
+-- feed() is called once per frame, in the order of the capture. What it finds out is kept in daly_results, where an
+-- ordinary frame costs no table.
 --
 -- A frame of CAN comes in the form of an A5 frame, on a bus that says so (bus.can): its length may be other than 8, its
 -- bytes are filled up to eight, and the destination stands where the checksum would (docs/wires.md 2):
@@ -26,6 +26,7 @@ local soc = require("daly_soc")
 local M = {}
 
 local byte = string.byte
+local note_reply = results_module.note_reply
 local BURST_IDS = bursts.IDS
 local A5 = 0xA5
 
@@ -50,7 +51,6 @@ end
 function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
   local first, address, id = byte(raw, 1, 3)
   local results, state = bus.results, bus.state
-  local link, wait, memory = results.link, results.wait, results.memory
   local mark = bus.mark
   if mark then
     local log = mark.log
@@ -79,9 +79,8 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
   if address < 0x20 and state.only ~= address then
     soc.note_address(state, address)
   end
-  -- Something for every frame: columns without gaps are lists, which take less room and time.
   if address >= 0x20 then
-    link[slot], wait[slot], memory[slot] = false, ends, bus
+    results.entries[slot] = 0
     local flag, board, writes = exchange.ask(bus, slot, number, raw, address, id, starts, ends, side)
     if flag then
       results.flag[slot] = flag
@@ -90,6 +89,7 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
       boards.note_before(bus, slot, board, id)
     end
     if flag ~= "echo" then
+      results.ended[slot] = ends
       local burst = state.burst
       if burst and burst.id == id then
         burst.asked = true
@@ -97,10 +97,11 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
     end
   elseif byte(raw, 4) ~= 8 then -- on CAN: it answers, and says nothing
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
-    link[slot], wait[slot], memory[slot] = request or false, waited or false, false
+    note_reply(results, slot, request, waited)
   elseif BURST_IDS[id] then
-    local request, waited, shown, values = bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
-    link[slot], wait[slot], memory[slot] = request or false, waited or false, shown or false
+    local request, waited, shown, values, table_in =
+      bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
+    note_reply(results, slot, request, waited, shown, table_in)
     if values then
       boards.feed_table(bus, slot, number, values, address, id, starts, ends)
     end
@@ -109,8 +110,7 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
       bursts.finish(bus)
     end
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
-    link[slot], wait[slot] = request or false, waited or false
-    memory[slot] = boards.feed(bus, slot, number, raw, address, id, starts, ends) or false
+    note_reply(results, slot, request, waited, boards.feed(bus, slot, number, raw, address, id, starts, ends))
   end
 end
 
@@ -156,9 +156,7 @@ function M.rewind(bus, owner)
   end
   for i = 1, #mark.log do
     local fed = mark.log[i]
-    for _, column in ipairs(results_module.COLUMNS) do
-      results[column][fed.slot] = nil
-    end
+    results_module.forget(results, fed.slot)
     if fed.owner ~= owner then
       others[#others + 1] = fed
     end

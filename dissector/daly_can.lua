@@ -16,6 +16,7 @@ local hkms = require("daly_hkms")
 local ids = require("daly_can_ids")
 local second_look = require("daly_second_look")
 local view = require("daly_view")
+local is_known = require("daly_results").is_known
 local fields = require("daly_fields").fields
 
 local M = {}
@@ -130,7 +131,7 @@ end
 -- Show what was found out of a frame, if it is ours. Returns how many bytes were taken.
 local function show(from, slot, id, data, remote, buffer, pinfo, parent, handle, again)
   local found = from.found[slot]
-  local is_classic = not found and from.results.link[slot] ~= nil
+  local is_classic = not found and is_known(from.results, slot)
   if not found and not is_classic then
     return 0
   end

@@ -11,7 +11,7 @@ local results_module = require("daly_results")
 local M = {}
 
 local byte, sub = string.byte, string.sub
-local odd_of, later = results_module.odd, results_module.later
+local odd_of, answered = results_module.odd, results_module.answered
 
 --- Differences this small are the arithmetic's (docs/records.md 1).
 M.GRACE = 1e-6
@@ -178,11 +178,7 @@ function M.answer(bus, slot, number, raw, address, id, starts)
           list.last = i - 1
           request.over = true
         end
-        if bus.mark then
-          later(bus, "link", request.slot, number)
-        else
-          bus.results.link[request.slot] = number
-        end
+        answered(bus, request.slot, number)
         if request.board and request.board ~= address and address >= 0x01 and address <= 0x10 then
           odd_of(bus.results, slot).other_board = request.board
         end
@@ -205,11 +201,8 @@ end
 
 --- Whether a request got no reply while it waited, as far as is known by now.
 function M.is_unanswered(results, slot)
-  local bus = results.memory[slot]
-  return bus
-    and not results.link[slot]
-    and results.flag[slot] ~= "echo"
-    and results.latest - results.wait[slot] > bus.times.reply + GRACE
+  local ended = results.ended[slot]
+  return ended and results.latest - ended > results.buses[1].times.reply + GRACE
 end
 
 return M

@@ -6,6 +6,7 @@
 
 local bus_module = require("daly_bus")
 local bursts = require("daly_bursts")
+local note_reply = require("daly_results").note_reply
 local classic = require("daly_can_classic")
 
 local M = {}
@@ -91,16 +92,17 @@ function M.feed(hkms, slot, number, shape, data, time)
   local id = M.AS_A5[shape.register]
   if id then
     local stream, results = stream_of(hkms, shape.register, source), hkms.results
-    results.link[slot], results.wait[slot], results.memory[slot] = false, false, false
     if byte(data) == 0 then
+      note_reply(results, slot)
       return -- skipped, as FF is: they are numbered from 1
     end
     local burst = stream.state.burst
     if burst then
       burst.asked = true -- the same number again begins a new burst
     end
-    local _, wait, memory = bursts.feed(stream, slot, number, M.as_a5(shape, data), source, id, time, time)
-    results.wait[slot], results.memory[slot] = wait or false, memory or false
+    local _, wait, memory, _, table_in =
+      bursts.feed(stream, slot, number, M.as_a5(shape, data), source, id, time, time)
+    note_reply(results, slot, nil, wait, memory, table_in)
   elseif shape.register == COUNTS then
     local board = hkms.boards[source] or {}
     hkms.boards[source] = board

@@ -252,7 +252,10 @@ function M.feed(bus, slot, number, raw, starts, ends, side)
   elseif fn == 0x03 and not ambiguous then
     local start = request and request.register or not request and proven(raw, address, byte(raw, 3) / 2)
     if start then
-      bus.results.memory[slot] = take(bus, slot, number, raw, address, start, not request, starts, ends)
+      local memory = take(bus, slot, number, raw, address, start, not request, starts, ends)
+      if memory then
+        results_module.note_memory(bus.results, slot, memory)
+      end
     end
   end
 end

@@ -14,7 +14,7 @@ local M = {}
 
 local byte = string.byte
 local GRACE = exchange.GRACE
-local odd_of, later = results_module.odd, results_module.later
+local odd_of, answered = results_module.odd, results_module.answered
 
 local D2, ASKS, ANSWERS = 0xD2, 0x80, 0x50
 local READ, WRITE_ONE, WRITE_MANY, REFUSES = 0x03, 0x06, 0x10, 0x80
@@ -144,7 +144,7 @@ local function answer(bus, slot, number, raw, address, fn, starts)
   end
   if ambiguous then
     oldest.answered = true
-    later(bus, "link", oldest.slot, M.SOMEHOW)
+    answered(bus, oldest.slot, M.SOMEHOW)
     odd_of(bus.results, slot).ambiguous = true
     return nil, nil, true
   elseif newest then
@@ -153,7 +153,7 @@ local function answer(bus, slot, number, raw, address, fn, starts)
       list[newest_at] = nil
       list.last = newest_at - 1
     end
-    later(bus, "link", newest.slot, number)
+    answered(bus, newest.slot, number)
     local result = write_result(raw, fn, newest)
     if result then
       odd_of(bus.results, slot).result = result
@@ -187,15 +187,12 @@ function M.feed(bus, slot, number, raw, address, fn, starts, ends, side)
     end
   end
   if not reply then
-    results.link[slot], results.wait[slot], results.memory[slot] = false, ends, bus
+    results.entries[slot], results.ended[slot] = 0, ends
     ask(bus, slot, number, raw, address, fn, ends, side)
     return nil
   end
-  results.link[slot], results.wait[slot], results.memory[slot] = false, false, false
   local request, wait, ambiguous = answer(bus, slot, number, raw, address, fn, starts)
-  if request then
-    results.link[slot], results.wait[slot] = request.number, wait or false
-  end
+  results_module.note_reply(results, slot, request and request.number, wait)
   return true, request, ambiguous
 end
 

@@ -17,6 +17,7 @@ local registers = require("daly_registers")
 local quantities = require("daly_quantities")
 local payload = require("daly_payload")
 local faults = require("daly_faults")
+local results_module = require("daly_results")
 
 local M = {}
 
@@ -349,7 +350,7 @@ end
 local function read_reply(item, raw, slot, results, wanted, out)
   local address, _, length = byte(raw, 1, 3)
   local count = floor(length / 2)
-  local memory, odd = results.memory[slot], results.odd[slot]
+  local memory, odd = results_module.memory(results, slot), results.odd[slot]
   local name = name_of(address)
   if not memory then
     if wanted then
@@ -432,7 +433,7 @@ function M.show(item, raw, slot, results, wanted, again, out, slow)
   if answers == nil then
     answers = results.flag[slot] == "reply"
   end
-  local odd, link = results.odd[slot], results.link[slot]
+  local odd, link = results.odd[slot], results_module.link(results, slot)
   if wanted then
     show_head(raw, out)
     out.made(fields.direction, answers and 2 or 1)
@@ -446,7 +447,7 @@ function M.show(item, raw, slot, results, wanted, again, out, slow)
   end
   local text
   if answers then
-    local wait = results.wait[slot]
+    local wait = results_module.wait(results, slot)
     if wait then
       if wait > slow then
         item:add_proto_expert_info(experts.slow, format("The reply came %.3f s after the request", wait))

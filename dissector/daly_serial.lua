@@ -8,6 +8,7 @@
 local getters = require("daly_getters")
 local streams = require("daly_streams")
 local records = require("daly_records")
+local is_known = require("daly_results").is_known
 local second_look = require("daly_second_look")
 local view = require("daly_view")
 local windows = require("daly_windows")
@@ -175,7 +176,7 @@ function M.dissect(buffer, pinfo, parent, handle)
     if blind then
       from, again = look_again(number, pinfo, raw)
     end
-    whole = from and from.plans[number] == nil and from.results.link[number] ~= nil and windows.fits(raw, length)
+    whole = from and from.plans[number] == nil and is_known(from.results, number) and windows.fits(raw, length)
   end
 
   if whole then

@@ -8,6 +8,7 @@ local addresses = require("daly_addresses")
 local DATA_IDS = require("daly_data_ids")
 local hkms = require("daly_hkms_bus")
 local modbus = require("daly_stat_modbus")
+local results_module = require("daly_results")
 
 local M = {}
 
@@ -103,8 +104,8 @@ function Report:record(pinfo, kind, raw, slot, _, results)
   elseif address < 0x20 then
     row.replies = row.replies + 1
     self.boards[address] = true
-    local wait = results.wait[slot]
-    if wait and wait >= 0 then
+    local wait = results_module.wait(results, slot)
+    if wait then
       row.times[#row.times + 1] = wait
     end
   elseif results.flag[slot] == "echo" then

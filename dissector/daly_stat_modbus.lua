@@ -6,6 +6,7 @@
 
 local exchange = require("daly_modbus_exchange")
 local modbus_board = require("daly_modbus_board")
+local results_module = require("daly_results")
 
 local M = {}
 
@@ -73,7 +74,7 @@ function Table:count(number, raw, slot, results)
     self.asked[number * 65536 + answered_by] = row
     return row
   end
-  local link = results.link[slot]
+  local link = results_module.link(results, slot)
   local row = link and self.asked[link * 65536 + answered_by]
   if fn > REFUSES then
     local code = byte(raw, 3)
@@ -81,11 +82,11 @@ function Table:count(number, raw, slot, results)
     row = row or row_of(self.rows, address, plain, nil, 0)
     row.refused = row.refused + 1
   else
-    row = row or row_of(self.rows, address, plain, place_of(raw, plain, true, results.memory[slot]))
+    row = row or row_of(self.rows, address, plain, place_of(raw, plain, true, results_module.memory(results, slot)))
   end
   row.replies = row.replies + 1
-  local wait = results.wait[slot]
-  if wait and wait >= 0 then
+  local wait = results_module.wait(results, slot)
+  if wait then
     row.times[#row.times + 1] = wait
   end
   return nil, exchange.board(address)

@@ -12,11 +12,13 @@ local getters = require("daly_getters")
 local data_ids = require("daly_data_ids")
 local foreign = require("daly_foreign")
 local mbrtu = require("daly_mbrtu")
+local results_module = require("daly_results")
 
 local M = {}
 
 local fields, experts = field_module.fields, field_module.experts
 local board_of = addresses.board
+local memory_of, wait_of = results_module.memory, results_module.wait
 
 local A5 = 0xA5
 
@@ -389,7 +391,7 @@ end
 
 -- A reply: expert notes and fields; returns its words, which begin with `text`.
 local function reply(item, raw, slot, id, length, odd, text)
-  local memory = results.memory[slot]
+  local memory = memory_of(results, slot)
   frame.raw, frame.memory, frame.table, frame.text = raw, memory, nil, nil
   local whole = length == 8 -- else it says nothing
   local numbered = whole and bursts.IDS[id]
@@ -412,8 +414,8 @@ local function reply(item, raw, slot, id, length, odd, text)
       item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
     end
   end
-  local wait = results.wait[slot]
-  if wait and wait >= 0 then
+  local wait = wait_of(results, slot)
+  if wait then
     if wait > slow then
       item:add_proto_expert_info(experts.slow, format("The reply came %.3f s after the request", wait))
     end
@@ -466,7 +468,7 @@ local function a5(item, raw, slot)
     if not data_ids[id] then
       made(fields.unknown_id, true)
     end
-    local link = results.link[slot]
+    local link = results_module.link(results, slot)
     if link then
       made(answers and fields.request_in or fields.reply_in, link)
     end
