@@ -129,6 +129,7 @@ local function begin()
 end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
+local CHOSEN = 0 -- pinfo.match_uint where the user chose us (Decode As)
 
 local ports_of, brought_by = getters.attribute("Pinfo", "port_type"), getters.attribute("Pinfo", "match_uint")
 local handle
@@ -138,10 +139,12 @@ function daly.dissector(buffer, pinfo, parent)
   local ports = ports_of(pinfo)
   if ports ~= NO_PORTS then
     return (ports == ble.PORT_TYPE and ble or tcp).dissect(buffer, pinfo, parent, handle)
-  elseif can.brought(buffer, brought_by(pinfo)) then
+  end
+  local key = brought_by(pinfo)
+  if (key >= can.LOWEST or key == CHOSEN) and can.brought(buffer, key) then
     return can.dissect(buffer, pinfo, parent, handle)
   end
-  return serial.dissect(buffer, pinfo, parent, handle)
+  return serial.dissect(buffer, pinfo, parent, handle, key)
 end
 
 -- Doors -------------------------------------------------------------------------------------------

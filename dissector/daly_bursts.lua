@@ -138,7 +138,7 @@ local function link_parts(bus, burst, number)
 end
 
 --- A reply that is one of several frames. `damaged`: what stands right before it in its stream is. Returns, each nil
--- where there is none: packet of its request; response time; what it is shown with; the table; the packet of the burst's
+-- where there is none: packet of its request; response time; what it is shown with; the table; packet of the burst's
 -- table, where that came before.
 function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   local state = bus.state

@@ -49,7 +49,7 @@ end
 -- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from;
 -- `damaged`: the record right before it in that stream is bad_checksum, short or junk.
 function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
-  local first, address, id = byte(raw, 1, 3)
+  local first, address, id, length = byte(raw, 1, 4)
   local results, state = bus.results, bus.state
   local mark = bus.mark
   if mark then
@@ -95,7 +95,7 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
         burst.asked = true
       end
     end
-  elseif byte(raw, 4) ~= 8 then -- on CAN: it answers, and says nothing
+  elseif length ~= 8 then -- on CAN: it answers, and says nothing
     local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
     note_reply(results, slot, request, waited)
   elseif BURST_IDS[id] then

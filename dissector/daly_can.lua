@@ -153,6 +153,7 @@ end
 
 local LOWEST = 0x351 -- of the identifiers; above all of wtap_encap's numbers
 local RTAC_HEADER = 12
+M.LOWEST = LOWEST
 
 --- Whether what brought us a packet is CAN, by pinfo.match_uint: an identifier; or the user's choice, which can be of
 -- RTAC serial too.

@@ -179,8 +179,9 @@ function M.answer(bus, slot, number, raw, address, id, starts)
           request.over = true
         end
         answered(bus, request.slot, number)
-        if request.board and request.board ~= address and address >= 0x01 and address <= 0x10 then
-          odd_of(bus.results, slot).other_board = request.board
+        local board = request.board
+        if board and board ~= address and address >= 0x01 and address <= 0x10 then
+          odd_of(bus.results, slot).other_board = board
         end
         if request.data and byte(raw, 4) == 8 then
           odd_of(bus.results, slot).result = write_result(id, raw, request.data)

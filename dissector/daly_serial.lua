@@ -16,9 +16,9 @@ local windows = require("daly_windows")
 local M = {}
 
 local bytes_of = Tvb.raw
+local read_first = streams.first
 local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
 local time_of, side_of = getters.attribute("Pinfo", "rel_ts"), getters.attribute("Pinfo", "p2p_dir")
-local brought_by = getters.attribute("Pinfo", "match_uint")
 local value_of = getters.attribute("FieldInfo", "value")
 local extract = getters.operator("Field", "__call", function(field)
   return field()
@@ -28,6 +28,8 @@ end)
 local options
 local capture -- as read in order, once
 local interfaces -- by number: what is known of each
+local newest_id, newest_direction -- of the newest packet: of its interface; and what is known of that and of its line
+local newest_interface, newest_stream
 local handed -- packets that were given to the user's own DLT_USER setting, by number
 local read_to -- number of the newest packet that was read
 
@@ -56,6 +58,7 @@ function M.init(with)
   options = with
   capture = streams.capture(options)
   interfaces, handed, read_to, blind = {}, {}, 0, nil
+  newest_id = nil
 end
 
 --- What was found out about the capture's frames so far, see daly_streams.
@@ -63,10 +66,14 @@ function M.capture()
   return capture
 end
 
--- The interface of the packet at hand, in this list of those known; the number -1 stands for one that can't be told.
-local function interface_of(known)
+-- Number of the interface of the packet at hand; -1: it can't be told.
+local function interface_key()
   local id = extract(interface_id)
-  local key = id and value_of(id) or -1
+  return id and value_of(id) or -1
+end
+
+-- The interface of the packet at hand, which has this number, in this list of those known.
+local function interface_of(known, key)
   local interface = known[key]
   if not interface then
     local info = interface_description()
@@ -83,9 +90,10 @@ local function interface_of(known)
   return interface
 end
 
--- Direction of the packet at hand: -1 not known, 0 sent, 1 received; and whether it takes a tree to know it.
-local function direction_of(pinfo)
-  if brought_by(pinfo) == CHOSEN and has_rtac then
+-- Direction of the packet at hand: -1 not known, 0 sent, 1 received; and whether it takes a tree to know it. `key`: as
+-- in M.dissect.
+local function direction_of(pinfo, key)
+  if key == CHOSEN and has_rtac then
     local event = rtac_event()
     return event and RTAC_DIRECTION[event.value] or -1, event == nil
   end
@@ -108,8 +116,8 @@ end
 
 -- What to show a packet from that was read without its interface: the capture, and whether its end is known.
 -- nil where packets of several interfaces were mixed up and this one was not read again: it is shown by itself.
-local function look_again(number, pinfo, raw)
-  local interface, direction = interface_of(blind.interfaces), direction_of(pinfo)
+local function look_again(number, pinfo, raw, key)
+  local interface, direction = interface_of(blind.interfaces, interface_key()), direction_of(pinfo, key)
   if interface.ours then -- as only its description tells, which nobody saw at first
     handed[number] = nil
   end
@@ -146,8 +154,9 @@ local function hand_over(buffer, pinfo, parent)
   return taken
 end
 
---- Dissect a packet of a serial line. `handle`: our protocol's dissector. Returns how many bytes were taken.
-function M.dissect(buffer, pinfo, parent, handle)
+--- Dissect a packet of a serial line. `handle`: our protocol's dissector; `key`: what brought it here, as
+-- pinfo.match_uint has it. Returns how many bytes were taken.
+function M.dissect(buffer, pinfo, parent, handle, key)
   local raw = bytes_of(buffer)
   local length = #raw
   local number = number_of(pinfo)
@@ -156,10 +165,22 @@ function M.dissect(buffer, pinfo, parent, handle)
   local whole
   if not again then
     read_to = number
-    local interface = interface_of(interfaces)
-    local direction, unseen = direction_of(pinfo)
-    whole = streams.first(capture, stream_of(capture, interface, direction), number, time_of(pinfo), raw)
-    if interface.key == -1 then
+    local id = extract(interface_id)
+    id = id and value_of(id) or -1
+    local direction, unseen
+    if key == CHOSEN then
+      direction, unseen = direction_of(pinfo, key)
+    else
+      direction = side_of(pinfo)
+    end
+    if id ~= newest_id or direction ~= newest_direction then
+      newest_interface = interface_of(interfaces, id)
+      newest_stream = stream_of(capture, newest_interface, direction)
+      newest_id, newest_direction = id, direction
+    end
+    local interface = newest_interface
+    whole = read_first(capture, newest_stream, number, time_of(pinfo), raw)
+    if id == -1 then
       blind = blind or second_look.new(streams.capture(options))
       blind.interfaces = blind.interfaces or {}
       second_look.note(blind, number)
@@ -174,7 +195,7 @@ function M.dissect(buffer, pinfo, parent, handle)
     end
   else
     if blind then
-      from, again = look_again(number, pinfo, raw)
+      from, again = look_again(number, pinfo, raw, key)
     end
     whole = from and from.plans[number] == nil and is_known(from.results, number) and windows.fits(raw, length)
   end

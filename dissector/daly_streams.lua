@@ -77,9 +77,6 @@ end
 
 -- Whether 13 bytes are a good A5 frame that holds no beginning of another.
 local function is_clear_frame(raw)
-  if clear[raw] then
-    return true
-  end
   local a, b, c, d, e, f, g, h, i, j, k, l, sum = byte(raw, 1, 13)
   if
     a ~= 0xA5
@@ -95,9 +92,6 @@ end
 
 -- The same of a Modbus frame of a board.
 local function is_one_modbus(raw, length)
-  if clear[raw] then
-    return true
-  end
   local first, fn = byte(raw, 1, 2)
   if first == INNER_A5 or not MODBUS_FUNCTIONS[fn] or windows.window(raw, 1, length) ~= length then
     return false
@@ -406,9 +400,9 @@ end
 -- frame and nothing else, whose slot is then `number`; else look at M.plan.
 function M.first(capture, stream, number, time, raw)
   local length = #raw
-  local cutter = stream.cutter
-  if time > capture.results.latest then
-    capture.results.latest = time
+  local cutter, results = stream.cutter, capture.results
+  if time > results.latest then
+    results.latest = time
   end
   if length == 0 then
     records.event(cutter)
@@ -422,9 +416,9 @@ function M.first(capture, stream, number, time, raw)
   end
   local ends = time + length * byte_time
   stream.ended = ends
-  if cutter.buf == "" and (length == 13 and is_clear_frame(raw) or is_one_modbus(raw, length)) then
-    local base = cutter.base
-    local damaged = stream.damaged_to == base and stream.aside_at ~= base
+  if cutter.buf == "" and (clear[raw] or length == 13 and is_clear_frame(raw) or is_one_modbus(raw, length)) then
+    local base, damaged = cutter.base, stream.damaged_to
+    damaged = damaged and damaged == base and stream.aside_at ~= base
     feed_bus(stream.bus, number, number, raw, time, ends, stream.side, stream, damaged)
     cutter.base = base + length
     return true
