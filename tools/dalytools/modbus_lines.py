@@ -54,8 +54,8 @@ _OWN: Final = frozenset(
 """Fields that a line tells otherwise, or leaves out."""
 
 
-def said(fields: Fields, *, waiting: bool = False) -> tuple[str, str, str, str]:
-    """Return who, what, values and warnings of one frame. waiting: its reply may still come."""
+def said(fields: Fields, *, overdue: bool = False) -> tuple[str, str, str, str]:
+    """Return who, what, values and warnings of one frame. overdue: its reply would have come by now."""
     reply = fields["daly.direction"] == REPLY
     board = fields.get("daly.board")
     unit = f"board {board}" if board else "D2"
@@ -64,7 +64,7 @@ def said(fields: Fields, *, waiting: bool = False) -> tuple[str, str, str, str]:
     start = f" {register:04X}" if isinstance(register, int) else ""
     count = fields.get("daly.modbus.count")
     size = f" x {count}" if isinstance(count, int) else ""
-    warnings = _warnings(fields, reply=reply, waiting=waiting)
+    warnings = _warnings(fields, reply=reply, overdue=overdue)
     if "daly.modbus.exception" in fields:
         refused = "read" if function == _REFUSES + _READ else "write"
         return unit, f"refuses a {refused}", f"code {_number(fields, 'daly.modbus.exception'):02X}", warnings
@@ -94,10 +94,10 @@ def _values(fields: Fields, *, reply: bool) -> str:
     return "  ".join(shown)
 
 
-def _warnings(fields: Fields, *, reply: bool, waiting: bool) -> str:
+def _warnings(fields: Fields, *, reply: bool, overdue: bool) -> str:
     warnings: list[str] = []
     if not reply:
-        if "daly.reply_in" not in fields and not waiting:
+        if "daly.reply_in" not in fields and (overdue or "daly.unanswered" in fields):
             warnings.append("no reply")
         register, count = fields.get("daly.modbus.register"), fields.get("daly.modbus.count", 1)
         if (

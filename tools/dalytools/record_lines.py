@@ -109,20 +109,20 @@ class Line:
         )
 
 
-def line(record: Decoded, *, waiting: bool = False) -> Line:
-    """Say in a line what a record is. waiting: a reply that is not there yet may still come."""
+def line(record: Decoded, *, overdue: bool = False) -> Line:
+    """Say in a line what a record is. overdue: its reply would have come by now."""
     fields = record.fields
     values = warnings = ""
     kind = record.kind.value
     who, what = "", kind.replace("_", " ")
     match record.kind:
         case Kind.FRAME if fields["daly.dialect"] == "a5":
-            kind, who, what, values, warnings = _a5(record, waiting=waiting)
+            kind, who, what, values, warnings = _a5(record, overdue=overdue)
         case Kind.FRAME if fields["daly.dialect"] == "hkms":
             kind, who, what, values, warnings = _hkms(record)
         case Kind.FRAME:
             kind = "modbus"
-            who, what, values, warnings = modbus_lines.said(fields, waiting=waiting)
+            who, what, values, warnings = modbus_lines.said(fields, overdue=overdue)
         case Kind.BAD_CHECKSUM:
             who, what = f"address {record.data[1]:02X}", f"{record.data[2]:02X} damaged"
             values, warnings = _hex(record.data[4:12]), f"checksum {record.data[12]:02X} is wrong"
@@ -165,7 +165,7 @@ def _words(fields: Fields, name: str) -> str:
     return " ".join(str(value) for value in _listed(fields, name))
 
 
-def _a5(record: Decoded, *, waiting: bool) -> tuple[str, str, str, str, str]:
+def _a5(record: Decoded, *, overdue: bool) -> tuple[str, str, str, str, str]:
     fields = record.fields
     data_id, content = _number(fields, "daly.data_id"), bytes.fromhex(str(fields.get("daly.data", "")))
     address = _number(fields, "daly.can.source" if record.transport == "can" else "daly.address")
@@ -181,7 +181,7 @@ def _a5(record: Decoded, *, waiting: bool) -> tuple[str, str, str, str, str]:
             warnings.append("retry")
         if "daly.second_host" in fields:
             warnings.append("a second host asks")
-        if "daly.reply_in" not in fields and not waiting:
+        if "daly.reply_in" not in fields and (overdue or "daly.unanswered" in fields):
             warnings.append("no reply")
         asked = f"WRITE {what}" if "daly.write" in fields else f"{what}?"
         return "request", who, asked, values, ", ".join(warnings)

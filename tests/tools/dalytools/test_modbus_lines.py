@@ -41,8 +41,9 @@ def test_a_switch_is_set_and_refused() -> None:
 
 
 def test_a_read_nobody_answers() -> None:
-    (request,) = said((0.0, READ_13))
+    request, last = said((0.0, READ_13), (2.0, READ_13))
     assert words(request) == "host > D2 read 000C x 1? ! no reply"
+    assert words(last) == "host > D2 read 000C x 1?"  # the capture ends before its second is over
 
 
 def test_a_reply_that_fits_two_requests_names_nothing() -> None:

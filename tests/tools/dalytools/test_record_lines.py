@@ -70,7 +70,7 @@ def test_a_write_tells_what_it_would_set() -> None:
     """The rule write = read - 40: 19 is the write of 59."""
     write = a5(0x40, 0x19, "0e42 0ea6 0af0 0a8c")
     (record,) = decode([Packet(1, 0, bytes.fromhex(write))])
-    assert line(record, waiting=True).values == (
+    assert line(record).values == (
         "setting.cell_high_1 3650 mV  setting.cell_high_2 3750 mV  "
         "setting.cell_low_1 2800 mV  setting.cell_low_2 2700 mV"
     )

@@ -32,13 +32,13 @@ def frame_lines(state: State, width: int, rows: int, now: float, glyphs: Glyphs)
     newest = list(state.last)[-rows:] if rows > 0 else []
     return [
         rule("Last records", width, glyphs),
-        *(_line(heard.record, waiting=not heard.unanswered(now, state.reply_s)) for heard in newest),
+        *(_line(heard.record, overdue=heard.unanswered(now, state.reply_s)) for heard in newest),
     ]
 
 
-def _line(record: Decoded, *, waiting: bool) -> Text:
+def _line(record: Decoded, *, overdue: bool) -> Text:
     fields = record.fields
-    shown = record_line(record, waiting=waiting)
+    shown = record_line(record, overdue=overdue)
     style = WRITE if "daly.write" in fields or "daly.write_result" in fields else _COLOURS.get(shown.kind, "")
     return line(
         said(f" {shown.time}  ", "dim"),

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from dalytools import __version__
 from dalytools.findings.table import when
 from dalytools.report.figures import board_figure, bus_figure
+from dalytools.terminal_text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -135,7 +136,7 @@ def _head(title: str, collected: Collected) -> str:
     left_out = f"; {collected.boards_left_out} replies of further boards left out" if collected.boards_left_out else ""
     return (
         f'<div class="top"><h1>{_text(title)}</h1><button id="theme" type="button">light / dark</button></div>\n'
-        f"<p>{span}. {collected.records} records: {kinds or 'none'}.<br>"
+        f"<p>{span}. {counted(collected.records, 'record')}: {kinds or 'none'}.<br>"
         f'<span class="faint">{spoken}{left_out}. dalyshark {_text(__version__)}. '
         "Drag to zoom, double-click to zoom out; all plots share the time.</span></p>\n"
         "<noscript>The plots need JavaScript; the tables do not.</noscript>"
