@@ -22,7 +22,7 @@ local SEQUENCES = 2 ^ 32
 local capture -- options, buses by connection, results by slot (see daly_streams)
 local slots -- of frames, see feed()
 local held -- by bus and side: bytes that were undecided, and when they came; see begins()
-local fronts -- by packet: { raw = what we were handed, bytes = what Wireshark lost in front of it }; see front_of()
+local fronts -- by packet: { raw = what we were handed, bytes = what we had kept in front of it }; see before_of()
 local damaged -- by bus and side: whether the newest record is damaged
 
 --- Begin a capture. `with`: see daly_streams.capture.
@@ -69,48 +69,49 @@ local function cut(raw)
   return found, #cutter.buf
 end
 
--- The undecided bytes of this direction that stand in front of `raw`, if any, and how many of them are not in it.
--- Wireshark hands them to us again, as if they came with the next segment; not so where bytes between were lost, and
--- where it takes a segment of one byte that comes again for a keep-alive (4.6 forgets then that we wait, though nothing
--- is lost: sequence numbers tell).
-local function front_of(bus, side, raw)
+-- From 4.5 on Wireshark forgets a byte with which we began to wait for more when a keep-alive, a segment of the last
+-- byte alone, tells it again, and then no longer puts segments in order. So such a byte we keep ourselves.
+local major, minor = get_version():match("^(%d+)%.(%d+)")
+local forgets = tonumber(major) * 100 + tonumber(minor) >= 405
+
+-- What was undecided in this direction and stands in front of `raw` or at its beginning, if anything; and the sequence
+-- number behind `raw`. Wireshark hands such bytes to us again, as if they came with the next segment, but not those
+-- that we kept, nor where bytes between were lost.
+local function before_of(bus, side, raw)
   local before = held[bus] and held[bus][side]
-  if not before then
-    return nil, 0
-  end
-  local length, lost = segment_length(), before.lost
-  if length and length.value == #raw then
-    local at = sequence()
-    if at and at.value == before.next then
-      return before, #before.bytes
+  local length, at = segment_length(), sequence()
+  local begin = length and at and at.value + math.max(0, length.value - #raw)
+  if before then
+    local known = before.bytes:sub(before.kept + 1)
+    if known == "" then
+      if not begin or begin ~= before.next then
+        before = nil
+      end
+    elseif length and length.value == #raw or raw:sub(1, #known) ~= known then
+      before = nil
+    else
+      begin = before.next and before.next - #known
     end
-  elseif raw:sub(1, #before.bytes - lost) == before.bytes:sub(lost + 1) then
-    return before, lost
   end
-  return nil, 0
+  return before, begin and (begin + #raw) % SEQUENCES
 end
 
 -- When each byte of `raw` came: a list of { at = position, time }. `before`: what was undecided and stands in it first;
--- `left`: how many bytes at its end are undecided now, `lost` of `raw` are those that Wireshark does not know.
-local function begins(bus, side, raw, before, left, lost, time)
+-- `left`: how many bytes at its end are undecided now; `keep`: how many of `raw`, from its first, we keep ourselves;
+-- `next`: the sequence number behind it.
+local function begins(bus, side, raw, before, left, keep, next, time)
   local sides, times = held[bus] or {}, before and before.times or {}
   held[bus], sides[side] = sides, nil
   times[#times + 1] = { at = before and #before.bytes or 0, time = time }
   if left > 0 then
-    local first, kept = #raw - left, {}
+    local first, still = #raw - left, {}
     for i = 1, #times do
       local until_at = times[i + 1] and times[i + 1].at or #raw
       if until_at > first then
-        kept[#kept + 1] = { at = math.max(0, times[i].at - first), time = times[i].time }
+        still[#still + 1] = { at = math.max(0, times[i].at - first), time = times[i].time }
       end
     end
-    local length, at = segment_length(), sequence()
-    sides[side] = {
-      bytes = raw:sub(first + 1),
-      times = kept,
-      lost = math.max(0, lost - first),
-      next = length and at and (at.value + length.value) % SEQUENCES,
-    }
+    sides[side] = { bytes = raw:sub(first + 1), times = still, kept = math.max(0, keep - first), next = next }
   end
   return times
 end
@@ -158,17 +159,18 @@ function M.dissect(buffer, pinfo, parent, handle)
   if length == 0 then
     return 0
   end
-  local bus, side, before, front
-  local lost = 0
+  local bus, side, before, behind, front
+  local keep = 0
   if pinfo.visited then
     local known = next(fronts) and fronts[pinfo.number]
     local both = known and math.min(length, #known.raw) -- of what waits for more, a second look has nothing
     front = known and raw:sub(1, both) == known.raw:sub(1, both) and known.bytes
   else
     bus, side = bus_of(pinfo)
-    before, lost = front_of(bus, side, raw)
-    if lost > 0 then
-      front = before.bytes:sub(1, lost)
+    before, behind = before_of(bus, side, raw)
+    keep = before and before.kept or 0
+    if keep > 0 then
+      front = before.bytes:sub(1, keep)
       fronts[pinfo.number] = { raw = raw, bytes = front }
     end
   end
@@ -178,14 +180,16 @@ function M.dissect(buffer, pinfo, parent, handle)
   end
   local items, left = cut(raw)
   if left > 0 then
-    if pinfo.can_desegment > 0 then
+    if forgets and math.min(left, length) == 1 and (sequence() or pinfo.visited) then
+      keep = #raw
+    elseif pinfo.can_desegment > 0 then
       pinfo.desegment_offset = math.max(0, length - left)
       pinfo.desegment_len = ONE_MORE_SEGMENT
     else
       items, left = records.alone(raw), 0
     end
   end
-  feed(items, raw, pinfo, bus, side, bus and begins(bus, side, raw, before, left, lost, pinfo.rel_ts))
+  feed(items, raw, pinfo, bus, side, bus and begins(bus, side, raw, before, left, keep, behind, pinfo.rel_ts))
   if #items == 0 then
     return length
   end

@@ -217,6 +217,26 @@ def test_tcp_a_segment_of_one_byte_sent_again_is_not_lost(
     ]
 
 
+@pytest.mark.parametrize("passes", [(), ("-2", "-Y", "frame")])
+@pytest.mark.parametrize("before", ["", REPLY])
+def test_tcp_segments_are_in_order_after_a_keep_alive(
+    tshark: Tshark, open_folder: Path, passes: tuple[str, ...], before: str
+) -> None:
+    """It tells the last byte again, with which we began to wait: Wireshark 4.6 forgets then what its order is."""
+    connection = Connection(open_folder)
+    connection.send(1, before + REPLY[:2])
+    connection.send(1, REPLY[:2], at=connection.next[1] - 1)
+    connection.send(1, REPLY[2:])
+    first = connection.next[1]
+    connection.next[1] += 13
+    connection.send(1, REPLY + REPLY[:2])
+    connection.send(1, REQUEST, at=first)
+    connection.send(1, REPLY[2:])
+    words = (*passes, *PORTS, "-o", "tcp.reassemble_out_of_order:TRUE")
+    rows = ask(tshark, connection.save(), *words, names=["daly.kind"])
+    assert rows[1:] == [[""], ["frame"], [""], ["frame,frame"], ["frame"]]
+
+
 def test_tcp_what_stands_before_lost_bytes_is_not_put_before_others(tshark: Tshark, open_folder: Path) -> None:
     connection = Connection(open_folder)
     connection.send(1, REPLY[:2])
