@@ -8,7 +8,8 @@ The rule of both readings (docs/records.md 11) looks back only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 STEP_A = 1.0
 """Currents further apart are another load (docs/records.md 11)."""
-_MOST_HELD, _MOST_BOARDS = 256, 1024
+_MOST_HELD, _MOST_BOARDS, _MOST_STEPS = 256, 1024, 256
 
 Board = tuple[str, int | None, int | None]
 
@@ -35,6 +36,10 @@ class Held:
 class _Known:
     amperes: float | None = None
     state: object = None
+    told_in: int = 0
+    """Packet of the newest current."""
+    steps: deque[tuple[int, int]] = field(default_factory=lambda: deque[tuple[int, int]](maxlen=_MOST_STEPS))
+    """Packets of two currents in a row that are of another load."""
 
 
 class Load:
@@ -44,7 +49,7 @@ class Load:
         self._known: dict[Board, _Known] = {}
         self._held: dict[Board, list[Held]] = {}
 
-    def judged(self, board: Board, fields: Fields) -> list[Held]:
+    def judged(self, board: Board, packet: int, fields: Fields) -> list[Held]:
         """Take a reply of a board; return contradictions before it that no step of the load explains.
 
         One of nothing but zeros, as from a board that just woke, says nothing of the load.
@@ -65,10 +70,17 @@ class Load:
                 out, held = ([] if abs(amperes - known.amperes) > STEP_A else held), []
             self._held[board] = held
         if isinstance(amperes, float):
-            known.amperes = amperes
+            if known.amperes is not None and abs(amperes - known.amperes) > STEP_A:
+                known.steps.append((known.told_in, packet))
+            known.amperes, known.told_in = amperes, packet
         if state is not None:
             known.state = state
         return out
+
+    def stepped(self, board: Board, packet: str) -> bool:
+        """Tell whether a packet stands between two currents of another load: what is held against it is explained."""
+        known = self._known.get(board)
+        return known is not None and any(first < int(packet) < last for first, last in known.steps)
 
     def hold(self, board: Board, held: Held) -> bool:
         """Keep one until the next current; False where that says nothing: it stands at once."""

@@ -29,6 +29,7 @@ _SINOWEALTH = "Sinowealth"
 _MODBUS = "Modbus"
 _ANSWERS_81, _ASKS_81 = range(0x51, 0x61), 0x30
 """50 + N answers what 80 + N was asked (docs/records.md 2)."""
+_WAITS_NS = 1_000_000_000
 _LONG_S = 3.0
 """A board that is quiet so long did not just miss a request."""
 _SOMETIMES = (
@@ -97,6 +98,7 @@ class Requests(Watch):
         self._dialects: dict[tuple[str, str], _Dialect] = {}
         self._given_up: OrderedDict[int, _Line] = OrderedDict()  # packet of an unanswered request: its line
         self._last: dict[tuple[str, bytes], Decoded] = {}  # the newest request with these bytes, for its echo
+        self._written: dict[str, tuple[int, int]] = {}  # register and time of the newest write of D2, by bus
         self._foreign: set[str] = set()  # whose other traffic is there
 
     def record(self, record: Decoded, bus: str) -> None:
@@ -148,12 +150,24 @@ class Requests(Watch):
         elif "daly.unanswered" in fields:
             if asked.answered:
                 line.quiet.add(record.number, record.time_ns)
+            if self._may_be_answer(record, bus):
+                line.answered += 1
+                dialect.answered += 1
             self._given_up[record.number] = line
             if len(self._given_up) > _REMEMBERED:
                 self._given_up.popitem(last=False)
         if len(self._last) > 256:
             self._last.clear()
         self._last[bus, record.data] = record
+
+    def _may_be_answer(self, record: Decoded, bus: str) -> bool:
+        """Tell whether it may be the answer to a write of D2, with another value: both have the same address."""
+        register = number(record.fields, "daly.modbus.register")
+        if "daly.write" not in record.fields or record.fields.get("daly.dialect") != "d2" or register is None:
+            return False
+        before = self._written.get(bus)
+        self._written[bus] = register, record.time_ns
+        return before is not None and before[0] == register and 0 <= record.time_ns - before[1] < _WAITS_NS
 
     def _echo(self, record: Decoded, bus: str) -> None:
         line = self._lines[_line(record, bus)]

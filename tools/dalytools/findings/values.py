@@ -107,7 +107,7 @@ class Values(Watch):
             heard.add(board[1])
             if len(heard) > 1:  # D2 names no board: what stood against the first one's SOC was perhaps another's
                 self._alone.pop(bus, None)
-        for held in self._load.judged(board, fields):
+        for held in self._load.judged(board, record.number, fields):
             self._contradicts(board, held)
         against = words(fields, "daly.contradicts")
         for name, other in zip(words(fields, "daly.contradiction"), against, strict=False):
@@ -119,6 +119,8 @@ class Values(Watch):
             alone = self._alone.setdefault(bus, [])
             if name == "soc" and (dialect == "d2" or other in self._d2) and len(alone) < _MOST_ALONE:
                 alone.append((board, held))
+                continue
+            if name in _OF_LOAD and self._load.stepped(board, other):
                 continue
             # A reply that has the current itself was judged by it.
             if name not in _OF_LOAD or "daly.pack.current" in fields or not self._load.hold(board, held):

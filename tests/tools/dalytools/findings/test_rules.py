@@ -470,6 +470,36 @@ def test_faults_that_zeros_seemed_to_clear_were_there_all_the_time(tmp_path: Pat
     assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
 
 
+@pytest.mark.parametrize(("gap", "silent"), [(0.05, False), (2.0, True)])
+def test_a_write_of_d2_that_is_answered_with_another_value_is_no_silence(
+    gap: float, silent: bool, tmp_path: Path
+) -> None:
+    """Two different writes of one register in 50 ms: the second may be the answer."""
+    packets = [
+        heard for at in (5, 10) for heard in (Heard(at, rtu("d20600a50000")), Heard(at + gap, rtu("d20600a50001")))
+    ]
+    found = {finding.rule for finding in search(capture(tmp_path / "d2.pcapng", [*CLEAN, *packets, *LATER]))}
+    assert ("silent" in found, "other-dialect" in found) == (silent, silent)
+
+
+@pytest.mark.parametrize(("amperes", "counted"), [(59.5, 0), (0.0, 1)])
+def test_a_reply_from_a_step_of_the_load_contradicts_nothing(amperes: float, counted: int, tmp_path: Path) -> None:
+    """Cells sag at 2.4 s; the next current tells why, or that it is none; later the load is off again."""
+    current = f"{30000 + round(amperes * 10):04x}"
+    packets = [
+        *asked(0, 0x94, status(6)),
+        *asked(1, 0x90, PACK),
+        *asked(1.5, 0x91, extremes(3310, 2, 3290, 5)),
+        *asked(2.4, 0x95, cells(1, 3260, 3270, 3260), cells(2, 3260, 3250, 3260)),
+        *asked(3, 0x90, a5(1, 0x90, f"00c40000{current}0181")),
+        *asked(5, 0x90, PACK),
+        *asked(6, 0x91, extremes(3310, 2, 3290, 5)),
+        *asked(7, 0x90, PACK),
+    ]
+    found = search(capture(tmp_path / "step.pcapng", [*packets, *LATER]))
+    assert any(finding.rule == "contradiction" for finding in found) == bool(counted)
+
+
 def _of_81(*, volts: bool) -> list[Heard]:
     """A read of 0038 to 003A in 81: 19.8 V, 0 A, 38.5 %; or zeros."""
     state = "00c675300181" if volts else "00" * 6

@@ -130,6 +130,9 @@ def test_a_frame_that_comes_again_behind_the_cut_does_not() -> None:
     assert hidden(note, burst, [note, cut])
     assert not hidden(note, burst, [note, {**cut, "sent": 3}])
     assert not hidden(note, [*burst, heard(1.0771, 1, 0x95, "02")], [note, cut])
+    from_0 = [heard(1.05, 1, 0x95, "00"), heard(1.0636, 1, 0x95, "01")]
+    assert hidden(note, from_0, [note, cut])
+    assert not hidden(note, [*from_0, heard(1.0771, 1, 0x95, "01")], [note, cut])
 
 
 def test_a_late_reply_of_modbus_that_was_damaged_is_hidden() -> None:

@@ -235,9 +235,11 @@ def _comes_once(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
 
 
 def _of_number(note: Note, heard: list[Frame]) -> list[Frame]:
-    """Return the good frames of a note's number in its burst."""
-    soon = between(heard, at(note) - 1e-3, at(note) + BURST_QUIET_S)
-    return [frame for frame in soon if _is_of(frame, note) and frame.payload[0] == note["frame"]]
+    """Return the good frames of a note's place in its burst: boards count from 1, or from 0."""
+    mine = [frame for frame in heard if _is_of(frame, note)]
+    place = int(str(note["frame"])) - any(frame.payload[0] == 0 for frame in mine)
+    soon = between(mine, at(note) - 1e-3, at(note) + BURST_QUIET_S)
+    return [frame for frame in soon if frame.payload[0] == place]
 
 
 def _taken_before(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
