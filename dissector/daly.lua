@@ -142,7 +142,7 @@ function daly.dissector(buffer, pinfo, parent)
   end
   local key = brought_by(pinfo)
   if (key >= can.LOWEST or key == CHOSEN) and can.brought(buffer, key) then
-    return can.dissect(buffer, pinfo, parent, handle)
+    return can.dissect(buffer, pinfo, parent, handle, key)
   end
   return serial.dissect(buffer, pinfo, parent, handle, key)
 end

@@ -35,7 +35,7 @@ local watching = false
 local at_hand -- { state, number, again, raw }: what daly's dissector is called for
 
 local attributes = DissectorTable.get("btatt.handle")
-local frame_number = Field.new("frame.number")
+local has_tree = Field.new("frame") -- Wireshark asks for this one anyway
 local interface_id = Field.new("frame.interface_id")
 local has_adapter, adapter_id = pcall(Field.new, "hci_mon.adapter_id")
 
@@ -131,7 +131,7 @@ end
 
 -- What to show a packet from that was read before, and whether it was read again.
 local function look_again(number, pinfo, raw, length)
-  if not frame_number() then -- no tree now either
+  if not has_tree() then -- no tree now either
     if not blind.several then
       return first, false
     end
@@ -163,7 +163,7 @@ local function look(buffer, pinfo, parent)
   local state, again = first, number <= read_to or pinfo.visited
   if not again then
     read_to = number
-    local adapter = frame_number() and adapter_of() or 0
+    local adapter = has_tree() and adapter_of() or 0
     read(first, adapter, number, pinfo, raw, length, not began and number > 1)
     if not began then
       began, learned = number, first.host.learned

@@ -24,12 +24,14 @@ local M = {}
 -- Called by its name, a method of Wireshark's objects is looked up in C every time.
 local bytes_of, place_of, length_of = Tvb.raw, Tvb.offset, Tvb.reported_len
 local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
-local time_of, brought_by = getters.attribute("Pinfo", "rel_ts"), getters.attribute("Pinfo", "match_uint")
+local time_of = getters.attribute("Pinfo", "rel_ts")
 local value_of = getters.attribute("FieldInfo", "value")
 local extract = getters.operator("Field", "__call", function(field)
   return field()
 end)
-local out = view.out
+local out, look, shortly = view.out, view.look, view.shortly
+local raw_of, told = classic.raw, classic.told
+local read, shape_of = can_bus.read, ids.shape
 
 -- State of the capture that is open.
 local options
@@ -79,16 +81,9 @@ function M.init(with, search)
   read_to, blind, usual, others, slots = 0, nil, nil, {}, 0
 end
 
--- A frame's slot, and whether it is seen for the first time. The slot is the packet's number; some carriers put several
--- frames into one packet, which are told apart by their place.
-local function slot_of(buffer, number)
-  local place = place_of(buffer)
-  usual = usual or place
-  if place == usual then
-    local first = number > read_to
-    read_to = first and number or read_to
-    return number, first
-  end
+-- The slot of a frame that lies elsewhere than others in its packet, and whether it is seen for the first time: some
+-- carriers put several frames into one packet.
+local function slot_elsewhere(number, place)
   local key = number .. ":" .. place
   local slot = others[key]
   if slot then
@@ -128,27 +123,32 @@ local function show_foreign(_, thing, wanted)
   return "Not Daly: " .. thing.name
 end
 
+-- Show a classic frame in full, after view.look. `raw`: in the form of an A5 frame. Returns how many bytes were taken.
+local function show_classic(slot, shape, raw, length, remote, buffer, pinfo, parent)
+  frame.shape, frame.slot, frame.remote, frame.raw = shape, slot, remote, raw
+  view.one(parent, buffer, length, "frame", raw, slot, pinfo, classic.show, frame, told)
+  return length > 0 and length or 1 -- 0 would say that it is not ours
+end
+
 -- Show what was found out of a frame, if it is ours. Returns how many bytes were taken.
-local function show(from, slot, id, data, remote, buffer, pinfo, parent, handle, again)
-  local found = from.found[slot]
-  local is_classic = not found and is_known(from.results, slot)
-  if not found and not is_classic then
+local function show(from, slot, shape, data, remote, buffer, pinfo, parent, handle, again)
+  local found, length = from.found[slot], #data
+  if not found and not is_known(from.results, slot) then
     return 0
   end
-  local length = #data
-  view.look(parent, handle, from.results, again, "can")
-  frame.shape, frame.slot, frame.remote, frame.length = ids.shape(id), slot, remote, length
-  if is_classic then
-    frame.raw = classic.raw(frame.shape, data)
-    view.one(parent, buffer, length, "frame", frame.raw, slot, pinfo, classic.show, frame)
-  elseif found == can_bus.HKMS then
+  look(parent, handle, from.results, again, "can")
+  if not found then
+    return show_classic(slot, shape, raw_of(shape, data), length, remote, buffer, pinfo, parent)
+  end
+  frame.shape, frame.slot, frame.remote, frame.length = shape, slot, remote, length
+  if found == can_bus.HKMS then
     frame.raw = data
     view.one(parent, buffer, length, "frame", view.tap and hkms.counted(frame), slot, pinfo, hkms.show, frame)
   else
     frame.name = found
     view.one(parent, buffer, length, "foreign", data, slot, pinfo, show_foreign, frame)
   end
-  return length > 0 and length or 1 -- 0 would say that it is not ours
+  return length > 0 and length or 1
 end
 
 local LOWEST = 0x351 -- of the identifiers; above all of wtap_encap's numbers
@@ -193,10 +193,20 @@ local function note_blind(number)
   second_look.note(blind, number)
 end
 
---- Dissect a CAN frame. `handle`: our protocol's dissector. Returns how many bytes were taken, 0: it is not ours.
-function M.dissect(buffer, pinfo, parent, handle)
-  local id, number = brought_by(pinfo), number_of(pinfo)
-  local slot, first = slot_of(buffer, number)
+--- Dissect a CAN frame. `handle`: our protocol's dissector; `id`: pinfo.match_uint. Returns how many bytes were taken,
+-- 0: it is not ours.
+function M.dissect(buffer, pinfo, parent, handle, id)
+  local number, place = number_of(pinfo), place_of(buffer)
+  usual = usual or place
+  local slot, first
+  if place == usual then
+    slot, first = number, number > read_to
+    if first then
+      read_to = number
+    end
+  else
+    slot, first = slot_elsewhere(number, place)
+  end
   if id == CHOSEN then
     if chosen then
       return 0 -- its identifier brought it here before
@@ -218,12 +228,31 @@ function M.dissect(buffer, pinfo, parent, handle)
   if length ~= 8 and (length > 8 or length ~= length_of(buffer)) then
     return 0
   end
-  local from, whole = state, true
+  local shape = shape_of(id)
   -- Every frame but those of CAN FD has this flag, where there is a tree.
   local flag = extract(is_remote)
   local remote = flag and value_of(flag)
-  local seen = flag or can_id()
+  if first and flag and not remote and not is_again(pinfo) then -- the usual one
+    local interface = not no_interfaces and extract(interface_id)
+    no_interfaces = not interface
+    local key = interface and value_of(interface) or NO_INTERFACE
+    local raw = read(state, key, slot, number, shape, data, time_of(pinfo))
+    if not all_registered and state.known then
+      register_all()
+    end
+    if raw then
+      look(parent, handle, state.results, false, "can")
+      if shortly(parent, raw, slot, pinfo, told) then
+        return length > 0 and length or 1
+      end
+      return show_classic(slot, shape, raw, length, false, buffer, pinfo, parent)
+    end
+    local taken = show(state, slot, shape, data, false, buffer, pinfo, parent, handle, false)
+    return taken > 0 and taken or refuse(number, id)
+  end
+  local from, whole = state, true
   -- Without a tree it was taken for a data frame.
+  local seen = flag or can_id()
   local not_ours = seen and not flag or remote and id < ids.STANDARD
   local surprise = not_ours or remote and length > 0
   if remote then
@@ -233,7 +262,7 @@ function M.dissect(buffer, pinfo, parent, handle)
     if not_ours then
       return 0
     end
-    can_bus.read(state, interface_key(seen), slot, number, id, data, time_of(pinfo))
+    read(state, interface_key(seen), slot, number, shape, data, time_of(pinfo))
     if not seen then
       note_blind(number)
     end
@@ -243,15 +272,16 @@ function M.dissect(buffer, pinfo, parent, handle)
     whole = false
   elseif blind and seen then
     local key = interface_key(seen)
-    local read = not_ours and can_bus.pass or can_bus.read
+    local reads = not_ours and can_bus.pass or read
     local anew
-    from, anew = second_look.look(blind, state, number, key, surprise, read, key, slot, number, id, data, pinfo.rel_ts)
+    from, anew =
+      second_look.look(blind, state, number, key, surprise, reads, key, slot, number, shape, data, time_of(pinfo))
     if not from then
       return 0
     end
     whole = not anew
   end
-  local taken = show(from, slot, id, data, remote, buffer, pinfo, parent, handle, whole)
+  local taken = show(from, slot, shape, data, remote, buffer, pinfo, parent, handle, whole)
   return taken > 0 and taken or refuse(number, id)
 end
 

@@ -16,6 +16,8 @@ local hkms_bus = require("daly_hkms_bus")
 
 local M = {}
 
+local feed, raw_of = bus_module.feed, classic.raw
+
 local AMBIGUOUS = "HKMS or Deye"
 local NOTHING = ("\0"):rep(8)
 
@@ -82,27 +84,35 @@ local function kind_of(bus, shape, data)
   return nil
 end
 
---- One frame, in the order of the capture, once: `id`, `data` (at most eight bytes), `time` in s.
-function M.read(state, key, slot, number, id, data, time)
+--- One frame, in the order of the capture, once: its `shape` (daly_can_ids), `data` (at most eight bytes), `time` in s.
+-- Returns a classic frame in the form of an A5 frame.
+function M.read(state, key, slot, number, shape, data, time)
   local results = state.results
-  local bus = bus_of(state, key)
-  local shape = ids.shape(id)
-  local kind = kind_of(bus, shape, data)
+  local bus = state.buses[key] or bus_of(state, key)
+  local kind
+  if shape.sure then
+    kind, bus.classic = "classic", true
+  else
+    kind = kind_of(bus, shape, data)
+  end
   if not kind then
-    return
+    return nil
   end
   state.known = true
   if time > results.latest then
     results.latest = time
   end
   if kind == "classic" then
-    bus_module.feed(bus.daly, slot, number, classic.raw(shape, data), time, time, nil, bus)
+    local raw = raw_of(shape, data)
+    feed(bus.daly, slot, number, raw, time, time, nil, bus)
+    return raw
   elseif kind == "hkms" then
     state.found[slot] = M.HKMS
     hkms_bus.feed(bus.hkms, slot, number, shape, data, time)
   else
     state.found[slot] = kind
   end
+  return nil
 end
 
 --- A frame that is not read: CAN FD, and remote standard frames.

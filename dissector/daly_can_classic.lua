@@ -24,21 +24,15 @@ function M.as_a5(id, data, destination, source, start)
   return char(start or 0xA5, source, id, length) .. data .. char(destination)
 end
 
-local heads, tails = {}, {}
-for address = 0x00, 0xFF do
-  tails[address] = char(address)
-end
-
 --- The same for a classic frame of this shape (daly_can_ids).
 function M.raw(shape, data)
   if #data == 8 then
-    local id = shape.id
-    local head = heads[id]
+    local head = shape.head
     if not head then
       head = char(0xA5, shape.source, shape.classic, 8)
-      heads[id] = head
+      shape.head, shape.tail = head, char(shape.destination)
     end
-    return head .. data .. tails[shape.destination]
+    return head .. data .. shape.tail
   end
   return M.as_a5(shape.classic, data, shape.destination, shape.source)
 end
@@ -79,7 +73,10 @@ local function names(raw)
   return beginnings[id], sources[id], destinations[id]
 end
 
-local carrier = { names = names }
+--- What classic frames said (daly_view.shortly).
+M.told = view.told()
+
+local carrier = { names = names, told = M.told }
 
 function carrier.board()
   return shape.board

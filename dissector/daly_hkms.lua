@@ -342,7 +342,7 @@ function M.show(item, frame, wanted)
   local said = enough and words[register] and words[register](data) or view.hex_words(data, 1, length)
   local text = format("0x%04X %s", register, names[register])
   if shape.writes then
-    item:add_proto_expert_info(experts.write, "WRITE: " .. said)
+    out.note(item, experts.write, "WRITE: " .. said)
     return format("WRITE board %d  %s: %s", shape.destination, text, said), source, destination
   end
   return format("Board %d  %s: %s", shape.source, text, said), source, destination

@@ -117,14 +117,22 @@ local function board_of(state, address)
   return board
 end
 
+-- Where a board's memory has the packet that told something.
+local TOLD_IN = {
+  cell_count = "cell_count_in",
+  sensor_count = "sensor_count_in",
+  charge_mos = "charge_mos_in",
+  discharge_mos = "discharge_mos_in",
+}
+
 -- A count of cells or sensors, in this reply or the newest before.
 local function count_of(bus, slot, board, name, value, most, number)
   local before = board[name]
   if value and value >= 1 and value <= most then
     if before and before ~= value then
-      change(bus.results, slot, name, board[name .. "_in"])
+      change(bus.results, slot, name, board[TOLD_IN[name]])
     end
-    board[name], board[name .. "_in"] = value, number
+    board[name], board[TOLD_IN[name]] = value, number
     return value
   end
   return before
@@ -137,9 +145,9 @@ local function take_switch(bus, slot, board, name, value, number)
   end
   local on = value ~= 0
   if board[name] ~= nil and board[name] ~= on then
-    change(bus.results, slot, name, board[name .. "_in"])
+    change(bus.results, slot, name, board[TOLD_IN[name]])
   end
-  board[name], board[name .. "_in"] = on, number
+  board[name], board[TOLD_IN[name]] = on, number
 end
 
 local function take_faults(bus, slot, board, data, number)
@@ -185,25 +193,21 @@ local function take(bus, slot, number, raw, address, start, assumed, starts, end
   local known = registers.MAPS[modbus_exchange.dialect(address)]
   local board = board_of(bus.state, address)
   local count = byte(raw, 3) / 2
-  local function value(register)
-    local place = register - start
-    if place < 0 or place >= count then
-      return nil
-    end
-    local high, low = byte(raw, DATA + 2 * place, DATA + 2 * place + 1)
-    return high * 256 + low
-  end
-  local state = value(known.state)
+  local state = register_of(raw, DATA, start, count, known.state)
   if state and state < 256 then
     if board.state and board.state ~= state then
       change(bus.results, slot, "state", board.state_in)
     end
     board.state, board.state_in = state, number
   end
-  take_switch(bus, slot, board, "charge_mos", value(known.charge), number)
-  take_switch(bus, slot, board, "discharge_mos", value(known.discharge), number)
-  local cells = count_of(bus, slot, board, "cell_count", value(known.cell_count), boards.MOST_CELLS, number)
-  local sensors = count_of(bus, slot, board, "sensor_count", value(known.sensor_count), boards.MOST_SENSORS, number)
+  local charges, discharges =
+    register_of(raw, DATA, start, count, known.charge), register_of(raw, DATA, start, count, known.discharge)
+  take_switch(bus, slot, board, "charge_mos", charges, number)
+  take_switch(bus, slot, board, "discharge_mos", discharges, number)
+  local cells, sensors =
+    register_of(raw, DATA, start, count, known.cell_count), register_of(raw, DATA, start, count, known.sensor_count)
+  cells = count_of(bus, slot, board, "cell_count", cells, boards.MOST_CELLS, number)
+  sensors = count_of(bus, slot, board, "sensor_count", sensors, boards.MOST_SENSORS, number)
   local data = registers.faults(known, raw, DATA, start, count)
   if data then
     take_faults(bus, slot, board, data, number)
@@ -211,7 +215,7 @@ local function take(bus, slot, number, raw, address, start, assumed, starts, end
   if start + count > known.settings then
     take_settings(board, raw, start, count, number)
   end
-  local charge = value(known.soc)
+  local charge = register_of(raw, DATA, start, count, known.soc)
   if charge and charge ~= 0xFFFF then
     soc.of_modbus(bus, slot, address, charge, number, starts, ends)
   end

@@ -288,7 +288,7 @@ local function request(item, raw, slot, results, wanted, again, out)
   if fn == READ then
     text = kept[raw] or words_of_read(raw)
     if count == 1 and start == CELL_13 and address == 0xD2 then
-      item:add_proto_expert_info(experts.cell_13)
+      out.note(item, experts.cell_13)
     end
   else
     local odd = results.odd[slot]
@@ -297,10 +297,10 @@ local function request(item, raw, slot, results, wanted, again, out)
     end
     text, full = write_words(known, raw, offset, start, count, odd)
     local where = count == 1 and format("%04X", start) or format("%04X to %04X", start, start + count - 1)
-    item:add_proto_expert_info(experts.write, format("WRITE %s: %s", where, full))
+    out.note(item, experts.write, format("WRITE %s: %s", where, full))
     text = format("WRITE %s, %s: %s", where, name_of(address), text)
     if start <= CELL_13 and CELL_13 < start + count and address == 0xD2 then
-      item:add_proto_expert_info(experts.cell_13)
+      out.note(item, experts.cell_13)
     end
   end
   if wanted then
@@ -324,7 +324,7 @@ local function request(item, raw, slot, results, wanted, again, out)
   end
   if again and exchange.is_unanswered(results, slot) then
     text = text .. "  [unanswered]"
-    item:add_proto_expert_info(experts.unanswered)
+    out.note(item, experts.unanswered)
     if wanted then
       out.made(fields.unanswered, true)
     end
@@ -332,17 +332,17 @@ local function request(item, raw, slot, results, wanted, again, out)
   return text
 end
 
-local function note_faults(item, raw, known, start, count, odd)
+local function note_faults(item, raw, known, start, count, odd, out)
   local data = registers.faults(known, raw, REPLY_DATA + 1, start, count)
   if odd and odd.raised and #odd.raised > 0 then
-    item:add_proto_expert_info(experts.raised, "Raised: " .. concat(odd.raised, ", "))
+    out.note(item, experts.raised, "Raised: " .. concat(odd.raised, ", "))
   end
   if odd and odd.cleared and #odd.cleared > 0 then
-    item:add_proto_expert_info(experts.cleared, "Cleared: " .. concat(odd.cleared, ", "))
+    out.note(item, experts.cleared, "Cleared: " .. concat(odd.cleared, ", "))
   end
   local severe = data and payload.severe(data)
   if severe then
-    item:add_proto_expert_info(experts.severe, severe)
+    out.note(item, experts.severe, severe)
   end
 end
 
@@ -362,7 +362,7 @@ local function read_reply(item, raw, slot, results, wanted, out)
   local start, cells, sensors, assumed = modbus_board.unpack(memory)
   local known = registers.MAPS[modbus_exchange.dialect(address)]
   if known.faults and start <= known.faults and known.faults < start + count then
-    note_faults(item, raw, known, start, count, odd)
+    note_faults(item, raw, known, start, count, odd, out)
   end
   if wanted then
     if assumed then
@@ -392,7 +392,7 @@ local function reply(item, raw, slot, results, wanted, out)
   local address, fn, a, b, c, d = byte(raw, 1, 6)
   local odd = results.odd[slot]
   if odd and odd.ambiguous then
-    item:add_proto_expert_info(experts.ambiguous)
+    out.note(item, experts.ambiguous)
     if wanted then
       out.made(fields["modbus.ambiguous"], true)
     end
@@ -405,7 +405,7 @@ local function reply(item, raw, slot, results, wanted, out)
     end
     local what = fn == REFUSES + READ and "read" or "write"
     local code = EXCEPTIONS[a] and format("0x%02X, %s", a, EXCEPTIONS[a]) or format("0x%02X", a)
-    item:add_proto_expert_info(experts.exception, format("The board refuses the %s: %s", what, code))
+    out.note(item, experts.exception, format("The board refuses the %s: %s", what, code))
     return format("Exception %s  to a %s: %s", name_of(address), what, code)
   end
   local start = a * 256 + b

@@ -291,11 +291,28 @@ show[0x95] = function(frame, out)
   end
 end
 
+-- "frame 2  cells 4-6: ", by number * 64 + cells before: at most 17 x 51.
+local spans = {}
+
+local function span_of(n, before)
+  local key = n * 64 + before
+  local span = spans[key]
+  if not span then
+    span = format("frame %d  cells %d-%d: ", n, before + 1, before + 3)
+    spans[key] = span
+  end
+  return span
+end
+
 words[0x95] = function(frame)
   local burst = burst_of(frame)
   local _, _, _, _, n, a, b, c, d, e, f = byte(frame.raw, 1, 11)
   if not burst then
     return format("frame %d", n)
+  end
+  local first, count = 3 * (n - burst.base), burst.count
+  if not frame.table and (not count or first + 3 <= count) then -- most of them: in one go
+    return span_of(n, first) .. whole(a * 256 + b) .. " " .. whole(c * 256 + d) .. " " .. whole(e * 256 + f) .. " mV"
   end
   local real, before = real_slots(burst, frame, 3)
   local text = "frame " .. whole(n)

@@ -41,7 +41,7 @@ local blind
 local unset = {}
 M.others = {}
 
-local frame_number = Field.new("frame.number")
+local has_tree = Field.new("frame") -- Wireshark asks for this one anyway
 local interface_id = Field.new("frame.interface_id")
 local interface_description = Field.new("frame.interface_description")
 local has_not_handled, not_handled = pcall(Field.new, "user_dlt.not_handled")
@@ -213,7 +213,7 @@ function M.dissect(buffer, pinfo, parent, handle, key)
   if handed[number] then
     if has_frame(items) then
       handed[number] = nil
-    elseif hand_over(buffer, pinfo, parent) and (again or frame_number()) then
+    elseif hand_over(buffer, pinfo, parent) and (again or has_tree()) then
       return length
     end
     -- Without a tree nobody knows yet whose it is: so that Wireshark's Modbus reads it once, in order (daly_mbrtu).

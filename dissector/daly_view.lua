@@ -46,6 +46,9 @@ M.tap = nil
 -- Replies that took longer get a note, s.
 local slow = 0.5
 
+-- What frames said (see M.told), for each carrier.
+local memories = {}
+
 --- Once: the protocol, which the items of the tree belong to.
 function M.setup(proto)
   daly = proto
@@ -54,6 +57,9 @@ end
 --- What a slow reply is, s.
 function M.init(options)
   slow = options.slow
+  for i = 1, #memories do
+    memories[i].entries, memories[i].count = {}, 0
+  end
 end
 
 --- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
@@ -193,6 +199,20 @@ local function show_frame(status)
   made(checksum_status, status)
 end
 
+-- An expert note. `noted`: whether the frame at hand got one by its bytes and what was remembered for it.
+local noted
+
+local function note(item, expert, words)
+  noted = true
+  if words then
+    item:add_proto_expert_info(expert, words)
+  else
+    item:add_proto_expert_info(expert)
+  end
+end
+
+out.note = note
+
 -- Columns -----------------------------------------------------------------------------------------
 
 local HOSTS = { [0x40] = "PC", [0x80] = "App", [0x20] = "GPRS" }
@@ -245,40 +265,40 @@ end
 local frame = {} -- the one at hand, for daly_payload
 
 -- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and
--- destination, board = function(raw), show = function(raw): fields of its head }. nil: an A5 frame.
+-- destination, board = function(raw), show = function(raw): fields of its head, told = M.told(), or nil where the words
+-- say more than the bytes }. nil: an A5 frame.
 local carrier
 
 -- What a frame's rare things say (daly_results' odd): expert notes.
 local function note_odd(item, odd, id)
   if odd.late_to then
-    item:add_proto_expert_info(experts.late, format("Too late for the request in packet %d", odd.late_to))
+    note(item, experts.late, format("Too late for the request in packet %d", odd.late_to))
   elseif odd.unasked then
-    item:add_proto_expert_info(experts.unasked)
+    note(item, experts.unasked)
   end
   if odd.other_board then
-    item:add_proto_expert_info(experts.other_board, format("Board %d was asked", odd.other_board))
+    note(item, experts.other_board, format("Board %d was asked", odd.other_board))
   end
   if odd.second_host then
-    item:add_proto_expert_info(experts.second_host)
+    note(item, experts.second_host)
   end
   if odd.result and odd.result ~= "answered" then
-    item:add_proto_expert_info(
+    note(
+      item,
       experts[odd.result],
       format("Write 0x%02X: the board %s it", id, odd.result == "denied" and "denies" or "confirms")
     )
   end
   if odd.changed then
-    item:add_proto_expert_info(
+    note(
+      item,
       experts.changed,
       format("Changed since packet %d: %s", odd.from, concat(odd.changed, ", "):gsub("_", " "))
     )
   end
   local contradictions = odd.contradictions
   for i = 1, contradictions and #contradictions or 0, 3 do
-    item:add_proto_expert_info(
-      experts.contradiction,
-      format("%s (packet %d)", contradictions[i + 2], contradictions[i + 1])
-    )
+    note(item, experts.contradiction, format("%s (packet %d)", contradictions[i + 2], contradictions[i + 1]))
   end
 end
 
@@ -312,30 +332,47 @@ local function show_odd(odd)
   end
 end
 
--- Words of replies, by their bytes, and what they were made with: a reply comes again and again. Not more than so many;
--- those of another carrier apart, for they begin otherwise.
+-- What frames said, by their bytes: they come again and again. Not more than so many; those of each carrier apart, for
+-- they say it otherwise. An entry:
+--
+--   { memory, words, source, destination, longest }
+--
+-- `memory`: what it was shown with (daly_results); `longest`: how long it may have waited for nothing to be noted, s.
 local MOST_TOLD = 4096
-local told, told_with, told_count
 
-local function forget_told()
-  told, told_with, told_count = {}, {}, 0
+--- A memory of what frames said, for a carrier.
+function M.told()
+  local told = { entries = {}, count = 0 }
+  memories[#memories + 1] = told
+  return told
 end
-forget_told()
 
--- A reply's words, where the same was told before, else nil; and whether its words may be kept. `memory`: a value, or a
--- table that never changes.
+local own_told = M.told()
+
+-- The words of a reply that was told before with the same memory, or nil.
 local function told_before(raw, memory)
-  if carrier or type(memory) == "table" and not memory.shared then
-    return nil, false
+  local told = own_told
+  if carrier then
+    told = carrier.told
   end
-  return told_with[raw] == memory and told[raw], true
+  local entry = told and told.entries[raw]
+  return entry and entry[1] == (memory or false) and entry[2] or nil
 end
 
-local function keep_told(raw, memory, text)
-  if told_count >= MOST_TOLD then
-    forget_told()
+-- Remember what a frame said, where bytes and memory make it say the same again.
+local function keep_told(told, raw, slot, text, source, destination)
+  if again or results.odd[slot] or results.flag[slot] then
+    return
   end
-  told[raw], told_with[raw], told_count = text, memory, told_count + 1
+  local memory = memory_of(results, slot) or false
+  if type(memory) == "table" and not memory.shared then
+    return
+  end
+  if told.count >= MOST_TOLD then
+    told.entries, told.count = {}, 0
+  end
+  told.entries[raw] = { memory, text, source, destination, noted and -math.huge or slow }
+  told.count = told.count + 1
 end
 
 -- A request (echo, retry): expert notes and fields of its own; returns its words.
@@ -343,7 +380,7 @@ local function request(item, raw, slot, id, flag, text)
   local unanswered
   if flag == "echo" then
     text = text:gsub("^Request", "Echo")
-    item:add_proto_expert_info(experts.echo)
+    note(item, experts.echo)
   else
     if exchange.is_write(id) then
       local odd = results.odd[slot]
@@ -351,17 +388,17 @@ local function request(item, raw, slot, id, flag, text)
       if byte(raw, 4) == 8 then
         words, full = payload.write_words(id, raw, odd and odd.was, odd and odd.was_in)
       end
-      item:add_proto_expert_info(experts.write, "WRITE: " .. full)
+      note(item, experts.write, "WRITE: " .. full)
       text = format("WRITE%s: %s", text:gsub("^Request", ""), words)
     end
     if flag == "retry" then
       text = text .. "  [retry]"
-      item:add_proto_expert_info(experts.retry)
+      note(item, experts.retry)
     end
     if again and exchange.is_unanswered(results, slot) then
       unanswered = true
       text = text .. "  [unanswered]"
-      item:add_proto_expert_info(experts.unanswered)
+      note(item, experts.unanswered)
     end
   end
   if wanted then
@@ -398,20 +435,17 @@ local function reply(item, raw, slot, id, length, odd, text)
   if numbered then
     frame.table, frame.text = payload.whole(slot, memory, again)
   end
-  local before, lasting = told_before(raw, memory)
+  local before = told_before(raw, memory)
   if before then
     text = before
   else
     local words = whole and payload.words[id]
     text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
-    if lasting then
-      keep_told(raw, memory, text)
-    end
   end
   if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
     local complaints = payload.complaints(id, frame)
     for i = 1, #complaints do
-      item:add_proto_expert_info(experts[complaints[i][1]], complaints[i][2])
+      note(item, experts[complaints[i][1]], complaints[i][2])
     end
   end
   local wait = wait_of(results, slot)
@@ -425,7 +459,7 @@ local function reply(item, raw, slot, id, length, odd, text)
   end
   local cut_off = numbered and again and bursts.is_cut_off(results, slot)
   if cut_off then
-    item:add_proto_expert_info(experts.cut_off)
+    note(item, experts.cut_off)
   end
   if wanted then
     if numbered then
@@ -524,10 +558,7 @@ local function damaged(item, kind, raw, name)
     for i = 1, 12 do
       sum = (sum + byte(raw, i)) % 256
     end
-    item:add_proto_expert_info(
-      experts.bad_checksum,
-      format("Checksum is 0x%02X, the bytes sum up to 0x%02X", byte(raw, 13), sum)
-    )
+    note(item, experts.bad_checksum, format("Checksum is 0x%02X, the bytes sum up to 0x%02X", byte(raw, 13), sum))
     return format("Bad checksum  address 0x%02X  %s", address, id_words(id))
   end
   if wanted then
@@ -539,9 +570,9 @@ local function damaged(item, kind, raw, name)
     end
     return format("Not Daly: %s  %d bytes", name, length)
   elseif kind == "short" then
-    item:add_proto_expert_info(experts.short, format("Frame is cut off after %d bytes", length))
+    note(item, experts.short, format("Frame is cut off after %d bytes", length))
   else
-    item:add_proto_expert_info(experts.junk, format("%d bytes that are no frame", length))
+    note(item, experts.junk, format("%d bytes that are no frame", length))
   end
   local shown = hex_words(raw, 1, math.min(length, 16))
   return format("%s  %d bytes  %s%s", WORDS[kind], length, shown, length > 16 and " ..." or "")
@@ -660,14 +691,42 @@ function M.several(parent, buffer, raw, items, pinfo)
   end
 end
 
+--- Show a whole frame as it was shown before, where nobody looks closer. Returns whether that was enough; else it is to
+-- be shown in full, which remembers it. `told`: the memory of its carrier.
+function M.shortly(parent, raw, slot, pinfo, told)
+  local entry = told.entries[raw]
+  if not entry or wanted or again or M.tap then
+    return false
+  end
+  local known = results
+  if
+    known.odd[slot]
+    or known.flag[slot]
+    or entry[1] ~= (memory_of(known, slot) or false)
+    or (wait_of(known, slot) or 0) > entry[5]
+  then
+    return false
+  end
+  add(parent, daly)
+  local columns = columns_of(pinfo)
+  set_column(columns, "protocol", "Daly")
+  set_column(columns, "info", entry[2])
+  set_column(columns, "src", entry[3])
+  set_column(columns, "dst", entry[4])
+  return true
+end
+
 --- A packet that is one record of `kind`, whose `length` bytes stand at the buffer's beginning. `show(item, thing,
 -- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source,
--- destination; `raw` and `slot`: for daly_stat.
-function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing)
+-- destination; `raw` and `slot`: for daly_stat; `told`: memory for M.shortly, or nil.
+function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing, told)
   local node = begin(parent, buffer, 0, length, kind)
-  at = -4
+  at, noted = -4, false
   frame.table = nil
   local text, source, destination = show(node, thing, wanted)
+  if told then
+    keep_told(told, raw, slot, text, source, destination)
+  end
   set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
@@ -689,14 +748,18 @@ M.out, M.hex_words, M.id_words, M.host_name, M.reply_words = out, hex_words, id_
 
 --- A packet that is one whole frame, which is the usual one.
 function M.whole(parent, buffer, raw, slot, pinfo)
+  if M.shortly(parent, raw, slot, pinfo, own_told) then
+    return
+  end
   local node = begin(parent, buffer, 0, #raw, "frame")
-  frame.table = nil
+  frame.table, noted = nil, false
   local text, source, destination
   if byte(raw) == A5 then
     text, source, destination = a5(node, raw, slot)
   else
     text, source, destination = modbus(node, raw, slot)
   end
+  keep_told(own_told, raw, slot, text, source, destination)
   set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
