@@ -147,8 +147,7 @@ class Splitter:
 
     def event(self) -> None:
         """Note that an event lies at the present position: junk and foreign records end there, frames do not."""
-        if self._data:
-            self._gap.event(len(self._data))
+        self._gap.event(len(self._data))
 
     def flush(self) -> list[Record]:
         """Silence, or the end of the stream: return all that is held. The next bytes begin a new segment."""

@@ -280,6 +280,17 @@ def test_event_between_foreign_and_junk() -> None:
     assert eventful(REPLY[:6], sinowealth + REPLY) == [(SHORT, 6), (FOREIGN, 6), (FRAME, 13)]
 
 
+def test_event_behind_what_is_decided_divides_the_gap_too() -> None:
+    """A gap goes on behind a damaged frame; what stands behind the event is a piece of its own."""
+    broken = bytes.fromhex("a51162086f398a1c0a76357c9b")  # 11 is no function of Modbus: it is decided at once
+    sinowealth = bytes.fromhex("0a0a028795a8")
+    assert eventful(broken, sinowealth) == [(BAD, 13), (FOREIGN, 6)]
+    assert eventful(broken, sinowealth + REPLY) == [(BAD, 13), (FOREIGN, 6), (FRAME, 13)]
+    assert eventful(broken + b"\x00", sinowealth + REPLY) == [(BAD, 13), (JUNK, 1), (FOREIGN, 6), (FRAME, 13)]
+    assert eventful(REPLY, sinowealth) == [(FRAME, 13), (FOREIGN, 6)]
+    assert eventful(broken, b"\x00" + sinowealth + REPLY) == [(BAD, 13), (JUNK, 7), (FRAME, 13)]
+
+
 def test_piece_before_an_event_comes_as_soon_as_it_is_certain() -> None:
     splitter = Splitter()
     assert splitter.feed(real.data("sino-0-req") + real.data("sino-0-rsp")) == []
