@@ -69,8 +69,8 @@ local function cut(raw)
   return found, #cutter.buf
 end
 
--- From 4.5 on Wireshark forgets a byte with which we began to wait for more when a keep-alive, a segment of the last
--- byte alone, tells it again, and then no longer puts segments in order. So such a byte we keep ourselves.
+-- Wireshark 4.6 (4.4 does not) forgets a byte with which we began to wait for more when a keep-alive, a segment of the
+-- last byte alone, tells it again, and then no longer puts segments in order. So such a byte we keep ourselves.
 local major, minor = get_version():match("^(%d+)%.(%d+)")
 local forgets = tonumber(major) * 100 + tonumber(minor) >= 405
 

@@ -15,15 +15,16 @@ from scapy.packet import Packet, Raw
 from scapy.utils import wrpcap
 from tests.dissector.dissection import Dissect, P, a5, in_a_row, kinds, numbers
 from tests.dissector.test_views import Sharkd
+from tests.tools.dalytools.made import dissector
 
+import dalytools.tshark
 from dalycapture.create import open_writer
 from dalycapture.interface import Interface
+from dalytools.tshark import Tshark
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
-
-    from dalytools.tshark import Tshark
 
 EPOCH = 1_700_000_000
 REQUEST, REPLY = a5(0x40, 0x90), a5(1, 0x90, "0215000075300200")
@@ -122,6 +123,19 @@ class Connection:
         return path
 
 
+@pytest.fixture(scope="module", params=["as this Wireshark needs it", "as 4.6 needs it"])
+def on_tcp(request: pytest.FixtureRequest, tshark: Tshark) -> Iterator[Tshark]:
+    """The dissector as it is, and keeping bytes itself, which it does where Wireshark forgets them (from 4.6 on)."""
+    if "4.6" not in request.param:
+        yield tshark
+        return
+    keeping = r"local forgets = .*", "local forgets = true"
+    with dissector(keeping) as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(dalytools.tshark, "dissector_folder", lambda: folder)
+        with Tshark() as started:
+            yield started
+
+
 PORTS = ("-o", "daly.tcp_ports:4001")
 WAYS = {
     "preference": PORTS,
@@ -165,7 +179,7 @@ def test_the_heuristic_keeps_its_hands_off(tshark: Tshark, open_folder: Path, ot
 
 
 @pytest.mark.parametrize("size", [1, 5, 12, 14, 40])
-def test_tcp_frames_cut_anywhere(tshark: Tshark, open_folder: Path, size: int) -> None:
+def test_tcp_frames_cut_anywhere(on_tcp: Tshark, open_folder: Path, size: int) -> None:
     connection = Connection(open_folder)
     connection.send(0, a5(0x40, 0x94) + a5(0x40, 0x95))
     answer = a5(1, 0x94, "0602") + a5(1, 0x95, "010ce40ce50ce6") + a5(1, 0x95, "020ce70ce80ce9")
@@ -173,27 +187,27 @@ def test_tcp_frames_cut_anywhere(tshark: Tshark, open_folder: Path, size: int) -
         connection.send(1, answer[start : start + 2 * size])
     for passes in (), ("-2",):
         rows = ask(
-            tshark, connection.save(), *passes, *PORTS, names=["daly.data_id", "daly.cells.voltage", "daly.kind"]
+            on_tcp, connection.save(), *passes, *PORTS, names=["daly.data_id", "daly.cells.voltage", "daly.kind"]
         )
         assert ",".join(row[0] for row in rows if row[0]) == "0x94,0x95,0x94,0x95,0x95"
         assert [row[1] for row in rows if row[1]] == ["3300,3301,3302,3303,3304,3305"]
         assert {kind for row in rows for kind in row[2].split(",") if kind} == {"frame"}
 
 
-def test_tcp_segments_sent_again_count_once(tshark: Tshark, open_folder: Path) -> None:
+def test_tcp_segments_sent_again_count_once(on_tcp: Tshark, open_folder: Path) -> None:
     connection = Connection(open_folder)
     connection.send(0, REQUEST)
     connection.send(1, REPLY[:12])
     again = connection.send(1, REPLY[12:])
     connection.send(1, REPLY[12:], at=again)
-    rows = ask(tshark, connection.save(), *PORTS, names=["daly.kind"])
+    rows = ask(on_tcp, connection.save(), *PORTS, names=["daly.kind"])
     assert rows == [["frame"], [""], ["frame"], [""]]
 
 
 @pytest.mark.parametrize("passes", [(), ("-2", "-Y", "frame")])
 @pytest.mark.parametrize("cuts", [(1,), (1, 2), (1, 2, 7)])
 def test_tcp_a_segment_of_one_byte_sent_again_is_not_lost(
-    tshark: Tshark, open_folder: Path, passes: tuple[str, ...], cuts: tuple[int, ...]
+    on_tcp: Tshark, open_folder: Path, passes: tuple[str, ...], cuts: tuple[int, ...]
 ) -> None:
     """Wireshark takes it for a keep-alive; 4.6 forgets the first one then (told by a first pass with a tree)."""
     connection = Connection(open_folder)
@@ -205,7 +219,7 @@ def test_tcp_a_segment_of_one_byte_sent_again_is_not_lost(
         connection.send(1, REPLY[first:last] + ("a540" if last == bounds[-1] else ""))
     connection.send(1, "00" + REPLY)
     names = ["daly.kind", "daly.undecoded", "daly.response_time", "daly.data"]
-    rows = ask(tshark, connection.save(), *passes, *PORTS, names=names)
+    rows = ask(on_tcp, connection.save(), *passes, *PORTS, names=names)
     data = REPLY[8:24]
     waiting = [["", "", "", ""] for _ in cuts]
     assert rows == [
@@ -218,13 +232,15 @@ def test_tcp_a_segment_of_one_byte_sent_again_is_not_lost(
 
 
 @pytest.mark.parametrize("passes", [(), ("-2", "-Y", "frame")])
-@pytest.mark.parametrize("before", ["", REPLY])
+@pytest.mark.parametrize("before", [("",), (REPLY,), (REPLY[:12], REPLY[12:])])
 def test_tcp_segments_are_in_order_after_a_keep_alive(
-    tshark: Tshark, open_folder: Path, passes: tuple[str, ...], before: str
+    on_tcp: Tshark, open_folder: Path, passes: tuple[str, ...], before: tuple[str, ...]
 ) -> None:
     """It tells the last byte again, with which we began to wait: Wireshark 4.6 forgets then what its order is."""
     connection = Connection(open_folder)
-    connection.send(1, before + REPLY[:2])
+    for piece in before[:-1]:
+        connection.send(1, piece)
+    connection.send(1, before[-1] + REPLY[:2])
     connection.send(1, REPLY[:2], at=connection.next[1] - 1)
     connection.send(1, REPLY[2:])
     first = connection.next[1]
@@ -233,21 +249,21 @@ def test_tcp_segments_are_in_order_after_a_keep_alive(
     connection.send(1, REQUEST, at=first)
     connection.send(1, REPLY[2:])
     words = (*passes, *PORTS, "-o", "tcp.reassemble_out_of_order:TRUE")
-    rows = ask(tshark, connection.save(), *words, names=["daly.kind"])
-    assert rows[1:] == [[""], ["frame"], [""], ["frame,frame"], ["frame"]]
+    rows = ask(on_tcp, connection.save(), *words, names=["daly.kind"])
+    assert rows[len(before) :] == [[""], ["frame"], [""], ["frame,frame"], ["frame"]]
 
 
-def test_tcp_what_stands_before_lost_bytes_is_not_put_before_others(tshark: Tshark, open_folder: Path) -> None:
+def test_tcp_what_stands_before_lost_bytes_is_not_put_before_others(on_tcp: Tshark, open_folder: Path) -> None:
     connection = Connection(open_folder)
     connection.send(1, REPLY[:2])
     connection.next[1] += 5
     connection.send(1, REPLY[12:])
     connection.send(1, REPLY)
-    rows = ask(tshark, connection.save(), *PORTS, names=["daly.undecoded"])
+    rows = ask(on_tcp, connection.save(), *PORTS, names=["daly.undecoded"])
     assert rows == [[""], [REPLY[12:]], [""]]
 
 
-def test_tcp_segments_out_of_order(tshark: Tshark, open_folder: Path) -> None:
+def test_tcp_segments_out_of_order(on_tcp: Tshark, open_folder: Path) -> None:
     """Wireshark puts them in order where its own preference says so."""
     connection = Connection(open_folder)
     first = connection.send(1, REPLY)
@@ -255,7 +271,7 @@ def test_tcp_segments_out_of_order(tshark: Tshark, open_folder: Path) -> None:
     connection.send(1, REPLY[14:])
     connection.send(1, REPLY[:14], at=first + 13)
     words = ("-2", *PORTS, "-o", "tcp.reassemble_out_of_order:TRUE")
-    rows = ask(tshark, connection.save(), *words, names=["daly.kind", "daly.pack.voltage"])
+    rows = ask(on_tcp, connection.save(), *words, names=["daly.kind", "daly.pack.voltage"])
     assert rows == [["frame", "53.3"], ["", ""], ["frame", "53.3"]]
 
 
@@ -290,12 +306,12 @@ def test_the_same_ends_connected_again_are_another_bus(tshark: Tshark, open_fold
     assert rows == [["frame", ""], ["", ""], ["frame", ""]]
 
 
-def test_a_reply_in_pieces_began_with_its_first(tshark: Tshark, open_folder: Path) -> None:
+def test_a_reply_in_pieces_began_with_its_first(on_tcp: Tshark, open_folder: Path) -> None:
     connection = Connection(open_folder)
     connection.send(0, REQUEST)  # at 0
     for start in (0, 6, 24):  # at 10, 20 and 30 ms
         connection.send(1, REPLY[start : {0: 6, 6: 24, 24: 26}[start]])
-    rows = ask(tshark, connection.save(), "-2", *PORTS, names=["daly.response_time"])
+    rows = ask(on_tcp, connection.save(), "-2", *PORTS, names=["daly.response_time"])
     assert rows == [[""], [""], [""], ["0.01"]]
 
 
