@@ -12,6 +12,8 @@ from __future__ import annotations
 import random
 from typing import TYPE_CHECKING, get_args
 
+from tests.tools.dalytools.findings.explained import SAID_BY
+
 from dalytools.simulator.board import LIE_IDS, frame
 from dalytools.simulator.faults import FAULT_BITS
 from dalytools.simulator.modbus import write_request
@@ -30,22 +32,14 @@ from dalytools.simulator.scenario import (
 )
 
 if TYPE_CHECKING:
-    from dalytools.simulator.scenario import Dialect, Lie
+    from dalytools.simulator.scenario import Dialect
 
 SECONDS = 240.0
 KINDS = ("noise", "tricks", "masters", "all")
 _METER = Foreign(bytes.fromhex("010300000002C40B"), 7.0, answer=bytes.fromhex("01030443666666A422"), name="meter")
 _SINOWEALTH = Foreign(bytes.fromhex("0A0102"), 11.0, 3.0, answer=bytes.fromhex("0D03FD"), name="BMSTool")
 _READS = ((0x00, 62), (0x00, 80), (0x80, 41), (0x28, 22))
-_LIES: dict[Lie, set[int]] = {
-    "pack_voltage": {0x90, 0x94, 0x95},
-    "cell_max": {0x91, 0x94, 0x95},
-    "cell_min": {0x91, 0x94, 0x95},
-    "cell_number": {0x91, 0x94},
-    "temperature_max": {0x92, 0x94, 0x96},
-    "temperature_min": {0x92, 0x94, 0x96},
-    "sensor_number": {0x92, 0x94},
-}
+_LIES = {name: needs for name, needs in SAID_BY.items() if name != "soc"}
 """What must be asked so that it shows. SOC against Modbus: where a program reads that too."""
 
 
