@@ -165,7 +165,7 @@ function M.dissect(buffer, pinfo, parent, handle, key)
   local whole
   if not again then
     read_to = number
-    -- What interface_key and direction_of do, written out: every frame comes by here, and a call costs 350 instructions.
+    -- What interface_key and direction_of do, written out: all frames come by here, and a call costs 350 instructions.
     local id = extract(interface_id)
     id = id and value_of(id) or -1
     local direction, unseen
