@@ -9,9 +9,15 @@ from typing import Any
 
 Row = dict[str, Any]
 
-_FILE = Path(__file__).parents[3] / "pcap_samples" / "real-frames.jsonl"
+_FOLDER = Path(__file__).parents[3] / "pcap_samples"
 
-ROWS: list[Row] = [json.loads(line) for line in _FILE.read_text(encoding="utf-8").splitlines()]
+
+def _rows(name: str) -> list[Row]:
+    return [json.loads(line) for line in (_FOLDER / name).read_text(encoding="utf-8").splitlines()]
+
+
+ROWS: list[Row] = _rows("real-frames.jsonl")
+MORE: list[Row] = _rows("more-real-frames.jsonl")
 UART: list[Row] = [row for row in ROWS if row["transport"] == "uart"]
 FRAMES: list[Row] = [row for row in UART if row.get("kind", "frame") == "frame" and len(row["hex"]) == 26]
 
