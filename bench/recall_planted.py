@@ -43,6 +43,9 @@ EXCHANGES = {
     "write_denied": (a5(0x40, 0xD9, "00"), a5(1, 0xD9, "01")),
     "modbus_ambiguous": (read(0x63, 2), read(0x83, 2), brings(0xFFFF, 0xFFFF)),
 }
+OF_MODBUS = {"modbus_exception", "absent_registers"}
+WAITS_NS = 1100 * MS
+"""So long an ambiguous reply leaves one of its requests waiting, which the next answer of Modbus would fit too."""
 AMONG = 4
 """One pause in so many, on average, gets something."""
 
@@ -60,6 +63,7 @@ def _planted(r: random.Random, path: Path) -> list[Note]:
     packets = list(read_capture(path))
     start = packets[0].time_ns
     notes: list[Note] = []
+    waits_until = start
     with open_writer(path.with_suffix(".planted"), application="test") as writer:
         writer.add_interface(Interface("made", packets[0].description))
         for packet, following in zip(packets, [*packets[1:], None], strict=True):
@@ -69,6 +73,10 @@ def _planted(r: random.Random, path: Path) -> list[Note]:
                 continue
             at = end + 60 * MS
             what = r.choice((*EVENTS, *EXCHANGES))
+            if what in OF_MODBUS and at < waits_until:
+                continue
+            if what == "modbus_ambiguous":
+                waits_until = at + WAITS_NS
             if what in EVENTS:
                 event_ns = packet.time_ns - 1000 * MS if what == "clock_step" else at
                 writer.write_packet(event_ns, b"", comment=EVENTS[what])

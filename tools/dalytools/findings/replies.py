@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dalytools.findings.limits import Limits
 
 _REMEMBERED = 1024  # requests
+_WAITS_NS = 1_020_000_000  # 1 s from its end
 
 
 @dataclass(slots=True)
@@ -48,6 +49,7 @@ class Replies(Watch):
         self._unasked = Groups(Tally)
         self._asked: OrderedDict[int, tuple[int, int | None]] = OrderedDict()  # packet: time (ns), board
         self._newest: dict[int, int] = {}  # data ID: the board that the newest request names
+        self._unanswered: dict[tuple[str, int, int], int] = {}  # bus, data ID, board: newest such request (ns)
 
     def record(self, record: Decoded, bus: str) -> None:
         """See requests, to know when and whom they asked; count replies."""
@@ -62,6 +64,8 @@ class Replies(Watch):
             data_id = number(record.fields, "daly.data_id")
             if data_id is not None and board is not None:
                 self._newest[data_id] = board
+                if "daly.unanswered" in record.fields and len(self._unanswered) < _REMEMBERED:
+                    self._unanswered[bus, data_id, board] = record.time_ns
         elif direction == REPLY:
             self._reply(record, bus)
 
@@ -81,6 +85,8 @@ class Replies(Watch):
         if late_to is not None:
             return  # its own request was given up: that some other board is asked by now is no sign
         if "daly.other_board" in fields:
+            if self._was_asked_too(record, bus):
+                return
             wrong = self._wrong[place]
             wrong.tally.add(record.number, record.time_ns)
             wrong.unasked += "daly.unasked" in fields
@@ -90,6 +96,17 @@ class Replies(Watch):
                 wrong.meant.add(meant)
         elif "daly.unasked" in fields:
             self._unasked[place].add(record.number, record.time_ns)
+
+    def _was_asked_too(self, record: Decoded, bus: str) -> bool:
+        """Tell whether the board that answers was asked itself, by another host, a moment before.
+
+        The reply goes to the newest request that takes it (records.md 7): one to 40 takes any board's.
+        """
+        data_id, board = number(record.fields, "daly.data_id"), number(record.fields, "daly.board")
+        if data_id is None or board is None:
+            return False
+        asked_ns = self._unanswered.get((bus, data_id, board))
+        return asked_ns is not None and 0 <= record.time_ns - asked_ns <= _WAITS_NS
 
     def findings(self) -> Iterator[Finding]:
         """Say which replies were not as they should be."""

@@ -17,6 +17,7 @@ _NEVER_ZERO = frozenset((0x90, 0x91, 0x94, 0x95))
 """Of these eight bytes of zero say what can't be: 0 V, cell number 0, no cells, frame number 0."""
 _NUMBERED = frozenset((0x95, 0x96))
 """Of these zeros behind the frame number may be slots that are not used."""
+_CELLS = 0x95
 _ZERO = "00" * 8
 _MOST_WAITING = 64
 _PAUSE_NS = 2_000_000_000
@@ -43,6 +44,8 @@ class ZeroRun:
     _unanswered: int = 0
     _answers: set[object] = field(default_factory=set[object])
     _newest_ns: int = 0
+    _cells_from_zero: bool = False
+    """Its newest reply was number 0 of the cells."""
     _awake: bool = False
     """It has made no pause since a reply that is not zero."""
 
@@ -98,12 +101,15 @@ class ZeroRun:
         """Take a reply's eight bytes (hex): whether it is zero for sure. None: it may be true, and waits."""
         self._unanswered = 0
         self._answers.add(data_id)
+        # All boards have a cell 1, which is in number 1 unless they count from 0.
+        no_cell = data_id == _CELLS and data[:2] == "01" and not self._cells_from_zero
+        self._cells_from_zero = data_id == _CELLS and data[:2] == "00"
         if data != _ZERO and not (data_id in _NUMBERED and data[2:] == _ZERO[2:]):
             self._awake = True
             return False
         if self.proven:
             return True
-        if len(self.waiting) < _MOST_WAITING and (data != _ZERO or data_id not in _NEVER_ZERO):
+        if not no_cell and len(self.waiting) < _MOST_WAITING and (data != _ZERO or data_id not in _NEVER_ZERO):
             return None
         self.proven = True
         return True

@@ -42,6 +42,11 @@ _TRICKS = frozenset(
 )
 
 
+_TAMPERS = ("skip_frame", "cut_burst", "repeat_frame")
+_Tampered = tuple[str, dict[str, int]]
+"""What was done to an answer, and where: for the truth."""
+
+
 class _Trick:
     """An event that waits for the next answers of its board."""
 
@@ -218,19 +223,21 @@ class Bus:
             if any(event.what == "silent" for event in tricks):
                 why = "silent"
                 continue
-            frames = self._tampered(list(answer.frames), number, tricks)
+            frames, tampered = _tampered(answer.frames, tricks)
+            lies = [] if zero else tricks  # zeros say nothing
             name = f"board {number}"
             jitter = board.board.habits.jitter_ms * self.timing.random()
             delay_ns = int((answer.delay_ms + jitter) * 1e6)
-            late = next((event for event in tricks if event.what == "late"), None)
+            late = None if asleep else next((event for event in tricks if event.what == "late"), None)
             if late is not None:
                 due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
                 faults = board.battery.reading.faults
-                said = partial(self._note_said, number, request, frames, tricks, None if zero else faults)
-                self._stations.append(LateReply(due, name, frames, said))
-                self.truth.note(due, "late", board=number, delay_s=late.delay_ms / 1e3, **_about(request))
+                begins = partial(self._note_late, number, request, due - int(late.delay_ms * 1e6), tampered)
+                said = partial(self._note_said, number, request, frames, lies, None if zero else faults)
+                self._stations.append(LateReply(due, name, frames, begins, said))
                 why = "late"
                 continue
+            self._note_tampered(number, request, tampered)
             quiet_from = self.now_ns
             self.now_ns += delay_ns
             if asleep:
@@ -244,12 +251,12 @@ class Bus:
             if asleep:
                 why = "echo" if whole else "damaged"
             elif stranger:
-                if whole and not zero:
+                if some and not zero:
                     self._note_faults_seen(number, request, frames, board.battery.reading.faults)
             elif some:
                 good, complete = True, whole
                 faults = board.battery.reading.faults
-                self._note_said(number, request, frames, tricks, faults if whole and not zero else None)
+                self._note_said(number, request, frames, lies, None if zero else faults)
             else:
                 why = "damaged"
         return good, complete, why
@@ -358,23 +365,6 @@ class Bus:
         address = 0x3F + number
         return bytes((START, address, *request[2:12], (sum(request[2:12]) + START + address) & 0xFF))
 
-    def _tampered(self, frames: list[bytes], number: int, tricks: list[Event]) -> list[bytes]:
-        """Leave out or repeat frames of a burst."""
-        for event in tricks:
-            if len(frames) < 2:
-                break
-            data_id, place = frames[0][2], event.frames
-            if event.what == "cut_burst" and place < len(frames):
-                self.truth.note(self.now_ns, "cut_burst", board=number, data_id=data_id, sent=place, of=len(frames))
-                frames = frames[:place]
-            elif event.what == "skip_frame" and place <= len(frames):
-                self.truth.note(self.now_ns, "skipped_frame", board=number, data_id=data_id, frame=place)
-                del frames[place - 1]
-            elif event.what == "repeat_frame" and place <= len(frames):
-                self.truth.note(self.now_ns, "repeated_frame", board=number, data_id=data_id, frame=place)
-                frames.insert(place, frames[place - 1])
-        return frames
-
     def _damaged(self, data: bytes, at_ns: int, sender: str, forced: Harm | None = None) -> bytes:
         """Damage bytes as the wire does; mostly it does not, and the very object comes back."""
         damage = self.scenario.damage
@@ -395,8 +385,9 @@ class Bus:
 
     def _note_unanswered(self, request: bytes, sender: str, at_ns: int, why: str) -> None:
         if self.truth.on:
-            facts = {"host": sender, "address": request[1], **_about(request), "why": why}
-            board = request[1] - 0x3F if request[0] == START else request[1] - modbus.ASKS_81
+            address, first = (request[1], 0x40) if request[0] == START else (request[0], modbus.ASKS_81 + 1)
+            facts = {"host": sender, "address": address, **_about(request), "why": why}
+            board = address - first + 1
             if 1 <= board <= 16:
                 facts["board"] = board
             self.truth.note(at_ns, "unanswered", **facts)
@@ -418,6 +409,14 @@ class Bus:
             dialect = "d2" if request[0] == modbus.D2 else "81"
             facts = {"dialect": dialect, "register": int.from_bytes(request[2:4]), "value": request[4:-2].hex()}
         self.truth.note(at_ns, "write", host=sender, **facts, result=result if reply else "none")
+
+    def _note_late(self, number: int, request: bytes, meant_ns: int, tampered: list[_Tampered]) -> None:
+        self.truth.note(self.now_ns, "late", board=number, delay_s=(self.now_ns - meant_ns) / 1e9, **_about(request))
+        self._note_tampered(number, request, tampered)
+
+    def _note_tampered(self, number: int, request: bytes, tampered: list[_Tampered]) -> None:
+        for what, facts in tampered:
+            self.truth.note(self.now_ns, what, board=number, data_id=request[2], **facts)
 
     def _note_said(
         self, number: int, request: bytes, frames: list[bytes], tricks: list[Event], faults: frozenset[str] | None
@@ -452,6 +451,35 @@ class Bus:
         for what, names in changes:
             for name in sorted(names):
                 self.truth.note(self.now_ns, what, board=number, name=name, dialect=key[0])
+
+
+def _tampered(frames: list[bytes], tricks: list[Event]) -> tuple[list[bytes], list[_Tampered]]:
+    """Leave out or repeat frames of a burst, each by its place in the whole one; return the rest, and what was done.
+
+    One that is left out does not come twice, whichever was asked for first.
+    """
+    done: list[_Tampered] = []
+    places: list[int] = list(range(1, len(frames) + 1))
+    for event in sorted(tricks, key=_order):
+        place = event.frames
+        if event.what not in _TAMPERS or len(places) < 2 or place not in places:
+            continue
+        if event.what == "cut_burst":
+            if place == places[-1]:
+                continue
+            places = [one for one in places if one <= place]
+            done.append(("cut_burst", {"sent": len(places), "of": len(frames)}))
+        elif event.what == "skip_frame":
+            places.remove(place)
+            done.append(("skipped_frame", {"frame": place}))
+        else:
+            places.insert(places.index(place), place)
+            done.append(("repeated_frame", {"frame": place}))
+    return [frames[place - 1] for place in places], done
+
+
+def _order(event: Event) -> int:
+    return _TAMPERS.index(event.what) if event.what in _TAMPERS else 0
 
 
 def _about(request: bytes) -> dict[str, int]:

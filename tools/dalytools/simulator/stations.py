@@ -166,15 +166,19 @@ class LateReply:
 
     listens = True
 
-    def __init__(self, due_ns: int, name: str, frames: list[bytes], said: Callable[[], None]) -> None:
-        """said: to be called when it was said, and heard well."""
+    def __init__(
+        self, due_ns: int, name: str, frames: list[bytes], begins: Callable[[], None], said: Callable[[], None]
+    ) -> None:
+        """begins, said: to be called when it begins, once the line is free, and when it was said and heard well."""
         self.due_ns = due_ns
         self._name = name
         self._frames = frames
+        self._begins = begins
         self._said = said
 
     def speak(self, bus: Pair) -> list[Sent]:
         """Say it now."""
+        self._begins()
         sent: list[Sent] = []
         for data in self._frames:
             sent += bus.say(data, self._name)

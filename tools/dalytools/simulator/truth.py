@@ -5,7 +5,7 @@ One object a happening, in order of time (seconds from the first moment of the b
 
     what            happened                                            with
     unanswered      a request got no good reply                         host, address, board, data_id or register, why
-    late            a reply began later than the host would wait        board, data_id, delay_s
+    late            a reply begins later than the host would wait       board, data_id, delay_s (waits for the line)
     echo            a sleeping board gave a request back                address, data_id
     zero_reply      a reply of nothing after waking up                  board, data_id
     damaged         a frame was damaged on the wire                     sender, how, sent, heard

@@ -138,6 +138,22 @@ def test_wrong_board_names_both(tmp_path: Path) -> None:
     assert one(found, "wrong-board").text == "board 1 answered 1 time what board 2 was asked"
 
 
+@pytest.mark.parametrize(("answers", "wrong"), [(4, False), (3, True)])
+def test_a_board_that_another_host_asked_answers_for_itself(answers: int, wrong: bool, tmp_path: Path) -> None:
+    """Board 4 is asked, 20 ms later 40, which names board 1 and takes any reply: the newest gets it (records.md 7)."""
+    reply = a5(answers, 0x90, "00c6000075300181")
+    packets = [Heard(5, a5(0x43, 0x90)), Heard(5.02, a5(0x40, 0x90)), Heard(5.05, reply)]
+    found = search(capture(tmp_path / "both.pcapng", [*CLEAN, *packets, *LATER]))
+    assert ("wrong-board" in {finding.rule for finding in found}) is wrong
+
+
+def test_a_board_that_was_asked_long_before_answers_for_another(tmp_path: Path) -> None:
+    reply = a5(4, 0x90, "00c6000075300181")
+    packets = [Heard(5, a5(0x43, 0x90)), Heard(7, a5(0x40, 0x90)), Heard(7.05, reply)]
+    found = search(capture(tmp_path / "both.pcapng", [*CLEAN, *packets, *LATER]))
+    assert one(found, "wrong-board").text == "board 4 answered 1 time what board 1 was asked"
+
+
 def test_lengths_of_bursts_are_compared_by_who_asks(tmp_path: Path) -> None:
     """The app gets 16 frames where the PC gets as many as the cells need (field notes, fact 6): that is no change."""
     few = [cells(number, 3300, 3300, 3300) for number in (1, 2)]
@@ -454,6 +470,33 @@ def test_samples(name: str) -> None:
     }
     if stem in expected:
         assert {finding.rule for finding in found} == expected[stem]
+
+
+def test_cells_of_zeros_in_the_first_frame_are_of_no_pack(tmp_path: Path) -> None:
+    """Every pack has a cell 1: the zeros of waking up begin there, and the fault was there all the time."""
+    packets = [
+        *asked(0, 0x98, FAULTY),
+        *asked(2, 0x95, cells(1, 0, 0, 0), cells(2, 0, 0, 0)),
+        *(heard for at, data_id in enumerate((0x98, 0x93), 3) for heard in asked(at, data_id, a5(1, data_id))),
+        *asked(6, 0x90, PACK),
+        *asked(7, 0x98, FAULTY),
+    ]
+    found = search(capture(tmp_path / "woke.pcapng", [*packets, *LATER]))
+    assert {finding.rule for finding in found} == {"zero-reply", "fault-standing"}
+    assert one(found, "zero-reply").tally.count == 4
+
+
+def test_cells_of_zeros_behind_the_first_frame_may_be_unused_slots(tmp_path: Path) -> None:
+    """A board that counts from 0, with three cells, sends all 16 frames to the app (field notes, fact 6)."""
+    packets = [
+        *asked(0, 0x98, FAULTY),
+        *asked(2, 0x95, cells(0, 3300, 3310, 3300), cells(1, 0, 0, 0), cells(2, 0, 0, 0), host=0x80),
+        *asked(3, 0x98, FINE),
+        *asked(4, 0x90, PACK),
+    ]
+    found = search(capture(tmp_path / "unused.pcapng", [*packets, *LATER]))
+    assert "zero-reply" not in {finding.rule for finding in found}
+    assert one(found, "fault-standing").text == "set from the first fault reply on, cleared 1 time"
 
 
 def test_faults_that_zeros_seemed_to_clear_were_there_all_the_time(tmp_path: Path) -> None:

@@ -23,8 +23,8 @@ ECHOES_S = 0.114
 """A request's 13.5 ms, and the 100 ms within which a repeat is an echo (docs/records.md 6)."""
 LATE_S = 0.5
 """From when on ``check`` calls a reply late."""
-LATER_S = 2.0
-"""For so long at the most a late reply waits until the line is free."""
+MOST_REPLY_S = 0.15
+"""A simulated board begins to answer within that."""
 SILENCE_S = 0.25
 NO_BOARD = frozenset((0x80, 0x20))
 D2, ASKS_81, ANSWERS_81 = 0xD2, 0x80, 0x50
@@ -49,21 +49,21 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("unanswered", _swallowed, "damage that is a good frame by accident took its first bytes"),
         ("unanswered", _left_whole, "two spoke at once, and its reply was left whole"),
         ("unanswered", exception_fits, "an exception of D2 fits each request that waits (wires.md 1)"),
+        ("unanswered", _late_one_answers, "a late reply to the request before answers it (wires.md 1)"),
+        ("late", _answers_newer_of_modbus, "it answers a newer request of Modbus (wires.md 1)"),
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
         ("collision", _good_by_accident, "its bytes are a good frame by accident"),
         ("foreign", _gap_is_mixed, "damaged bytes in the same gap, which so is not whole theirs (records.md 4)"),
-        ("repeated_frame", _cut_before, "the burst was cut off before the frame came again"),
         ("repeated_frame", _comes_once, "one of the two frames was damaged"),
         ("cut_burst", _nothing_came, "what came of it was damaged"),
         ("late", _nothing_came, "what came of it was damaged"),
         ("other_board", _nothing_came, "what came of it was damaged"),
         ("zero_reply", _may_be_zero, "registers that may all be zero"),
-        ("repeated_frame", _cancelled, "a frame left out and sent twice at once comes once"),
-        ("skipped_frame", _cancelled, "a frame left out and sent twice at once comes once"),
         ("late", _taken_before, "another reply was taken for it: a request is given one late reply (records.md 7)"),
         ("contradiction", _no_table, "no whole table of its board to hold it against (records.md 11)"),
+        ("contradiction", _no_count, "no 0x94 of its board before it (records.md 11)"),
         ("contradiction", _load_stepped, "the load stepped next to it, which explains a voltage"),
     ):
         if note["what"] == what and told(note, heard, notes):
@@ -126,17 +126,38 @@ def _answers_another(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     if "data_id" not in note:
         return False
     data_id, board = int(str(note["data_id"])), int(str(note["board"]))
-    within = LATER_S if note["what"] == "late" else 1e-3
     replies = [
-        frame for frame in between(heard, at(note) - 1e-3, at(note) + within) if _is_of(frame, note) and frame.begins
+        frame for frame in between(heard, at(note) - 1e-3, at(note) + 1e-3) if _is_of(frame, note) and frame.begins
     ]
-    given = answers(heard, data_id, at(note) - WAITS_S, at(note) + within)
+    given = answers(heard, data_id, at(note) - WAITS_S, at(note) + 1e-3)
     quick = {
         reply
         for request, reply in given.items()
         if reply.seconds - request.ends <= LATE_S and request.address in NO_BOARD | {0x3F + board}
     }
     return bool(replies) and quick.issuperset(replies)
+
+
+def _late_one_answers(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether a good late reply of its board for these registers comes while it waits; it is not its own."""
+    return note.get("why") != "late" and any(
+        _same_registers(note, other) and any(frame.modbus for frame in there_at(other, heard))
+        for other in during(notes, at(note), at(note) + WAITS_S)
+        if other["what"] == "late"
+    )
+
+
+def _answers_newer_of_modbus(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    return any(
+        other["what"] == "unanswered" and _same_registers(note, other) and _late_one_answers(other, heard, [note])
+        for other in during(notes, at(note) - WAITS_S, at(note))
+    )
+
+
+def _same_registers(note: Note, other: Note) -> bool:
+    """Tell whether both are of the same registers; of the same board, where both name one."""
+    boards = {note.get("board"), other.get("board")} - {None}
+    return "register" in note and note["register"] == other.get("register") and len(boards) < 2
 
 
 def sent_by(note: Note, board: int) -> bool:
@@ -211,25 +232,6 @@ def _may_be_zero(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     return "register" in note and int(str(note["register"])) > LAST_MEASURED and note["register"] != CAPACITY
 
 
-def _cancelled(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    """Tell whether the frame was both left out and doubled, and comes once."""
-    other = {"repeated_frame": "skipped_frame", "skipped_frame": "repeated_frame"}[str(note["what"])]
-    same = ("time", "board", "data_id", "frame")
-    both = any(one["what"] == other and all(one[key] == note[key] for key in same) for one in notes)
-    return both and len(_of_number(note, heard)) == 1
-
-
-def _cut_before(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    same = ("time", "board", "data_id")
-    cut = any(
-        other["what"] == "cut_burst"
-        and all(other[key] == note[key] for key in same)
-        and int(str(other["sent"])) <= int(str(note["frame"]))
-        for other in notes
-    )
-    return cut and len(_of_number(note, heard)) == 1
-
-
 def _comes_once(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     return len(_of_number(note, heard)) < 2 and _board_was_damaged(note, notes)
 
@@ -243,11 +245,24 @@ def _of_number(note: Note, heard: list[Frame]) -> list[Frame]:
 
 
 def _taken_before(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    return any(
+    return _own_is_answered(note, heard) or any(
         other["what"] == "other_board"
         and (other["board"], other["data_id"]) == (note["board"], note.get("data_id"))
         and 0 < at(note) - at(other) < RECENT_S
         for other in notes
+    )
+
+
+def _own_is_answered(note: Note, heard: list[Frame]) -> bool:
+    """Tell whether the request of a late reply was given another one before: 40, 80 and 20 take any board's."""
+    if "data_id" not in note:
+        return False
+    meant = at(note) - float(str(note["delay_s"]))
+    given = answers(heard, int(str(note["data_id"])), meant, meant)
+    names = NO_BOARD | {0x3F + int(str(note["board"]))}
+    return any(
+        request.address in names and meant - request.seconds < MOST_REPLY_S and reply.seconds < at(note) - 1e-3
+        for request, reply in given.items()
     )
 
 
@@ -267,6 +282,14 @@ def _no_table(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     near_before = bool(before) and time - before[-1].whole < RECENT_S and before[-1].some
     near_behind = bool(behind) and behind[0].whole - time < RECENT_S and behind[0].whole < again and behind[0].some
     return not near_before and not near_behind
+
+
+def _no_count(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    place = {"cell_number": 0, "sensor_number": 1}.get(str(note["name"]))
+    return place is not None and not any(
+        (frame.address, frame.data_id) == (note["board"], 0x94) and frame.payload[place]
+        for frame in between(heard, -1e9, at(note))
+    )
 
 
 def _load_stepped(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
