@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _REMEMBERED = 1024  # requests
 _MOST_FRAMES = 16  # paper 3, 0x95
 _QUIET_NS = 500_000_000
+_WAITS_NS = 1_020_000_000  # 1 s from a request's end
 
 
 @dataclass(slots=True)
@@ -64,6 +65,7 @@ class Answers(Watch):
         self._running: dict[Place, _Running] = {}
         self._lengths = Groups(_Length)
         self._askers: OrderedDict[int, int | None] = OrderedDict()  # request's packet: its address
+        self._unanswered: dict[tuple[str, int], tuple[int, int | None]] = {}  # bus, data ID: when (ns), by whom
         self._cells: dict[Place, object] = {}  # newest counts, by board
         self._now_ns = 0
 
@@ -75,7 +77,11 @@ class Answers(Watch):
         if record.kind is not Kind.FRAME or direction is None:
             return
         if direction == REQUEST:
-            self._askers[record.number] = first_number(fields, "daly.can.source", "daly.address", "daly.modbus.address")
+            asker = first_number(fields, "daly.can.source", "daly.address", "daly.modbus.address")
+            self._askers[record.number] = asker
+            data_id = number(fields, "daly.data_id")
+            if data_id is not None and "daly.unanswered" in fields:
+                self._unanswered[bus, data_id] = record.time_ns, asker
             if len(self._askers) > _REMEMBERED:
                 self._askers.popitem(last=False)
             return
@@ -132,6 +138,10 @@ class Answers(Watch):
         running.last, running.end_ns = frame, record.time_ns
         running.packet, running.time_ns = record.number, record.time_ns
         if "daly.burst.missing" in fields or "daly.burst.cut_off" in fields or not request:
+            running.whole = False
+        # One of two who asked at once: whom the board heard is not told by the reply (records.md 7).
+        other = self._unanswered.get((place.bus, number(fields, "daly.data_id") or 0))
+        if other is not None and other[1] != running.asker and 0 <= record.time_ns - other[0] <= _WAITS_NS:
             running.whole = False
 
     def _end(self, place: Place, running: _Running) -> None:

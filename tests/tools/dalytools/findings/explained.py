@@ -40,6 +40,8 @@ SAID_BY = {
 def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float) -> bool:
     """Tell whether the bytes say it. ago: how long before it what counts then may have come, s."""
     seconds = moment.seconds
+    if _fell_apart(moment, heard):
+        return True
     if moment.rule == "echo":
         return _repeats_a_collision(moment, heard, notes) or any(
             note["what"] == "unanswered" and note.get("why") == "busy" and same_request(note, seconds, heard)
@@ -69,6 +71,16 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
         # The one right before it is whole.
         if accident.good and max(accident.seconds, accident.ends - 2e-4) > at(note) - 1e-4
     )
+
+
+def _fell_apart(moment: Moment, heard: list[Frame]) -> bool:
+    """Tell whether a reply of Modbus with a good A5 frame inside is behind it: as its pieces, or as no reply at all."""
+    if moment.rule in {"damaged", "unasked", "unknown-id"}:
+        near = between(heard, moment.seconds - LONGEST_S, moment.seconds + 1e-6)
+        return any(frame.falls_apart and moment.seconds < frame.ends for frame in near)
+    if moment.rule in {"unanswered", "silent", "asleep"} and moment.place.data_id is None:
+        return any(frame.falls_apart for frame in between(heard, moment.seconds, moment.seconds + WAITS_S))
+    return False
 
 
 def _repeats_a_collision(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:

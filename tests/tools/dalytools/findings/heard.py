@@ -23,6 +23,9 @@ BURSTS = frozenset((0x95, 0x96, 0x55, 0x56, 0x57, 0x62, 0x63, 0x6A))
 BURST_QUIET_S = 0.5
 SLOTS = {0x95: 3, 0x96: 7}
 CLOCK_S = 1e-6
+PAUSE_S = 1e-3
+LONGEST = 257
+"""Bytes of a frame of Modbus (docs/records.md 2)."""
 
 
 class Frame(NamedTuple):
@@ -37,6 +40,8 @@ class Frame(NamedTuple):
     """The first byte of what is no good A5 frame."""
     modbus: bool = False
     """A good frame of Modbus, of an address of Daly's."""
+    falls_apart: bool = False
+    """A piece of such a frame with a good A5 frame inside, which ends first and so is the frame (docs/records.md 3)."""
 
     @property
     def good(self) -> bool:
@@ -67,6 +72,7 @@ class Frame(NamedTuple):
 def frames(path: Path, start_ns: int) -> list[Frame]:
     """Return all packets of a capture that hold bytes."""
     out: list[Frame] = []
+    said: list[bytes] = []
     for packet in read_capture(path):
         data, seconds = packet.data, (packet.time_ns - start_ns) / 1e9
         if packet.link_type == SOCKETCAN:
@@ -81,6 +87,25 @@ def frames(path: Path, start_ns: int) -> list[Frame]:
         elif data:
             modbus = data[0] in DALYS_MODBUS and len(data) > 4 and rtu(data[:-2].hex()) == data.hex()
             out.append(Frame(seconds, len(data), first=data[0], modbus=modbus))
+        if data:
+            said.append(data)
+    apart = _apart(out, said)
+    return [frame._replace(falls_apart=place in apart) for place, frame in enumerate(out)]
+
+
+def _apart(heard: list[Frame], said: list[bytes]) -> set[int]:
+    """Return the places of packets that together, without a pause, are a good frame of Modbus around one of A5."""
+    out: set[int] = set()
+    for first, frame in enumerate(heard):
+        if frame.modbus or frame.first not in DALYS_MODBUS:
+            continue
+        whole, last = said[first], first
+        while last + 1 < len(heard) and len(whole) < LONGEST and heard[last + 1].seconds - heard[last].ends < PAUSE_S:
+            last += 1
+            whole += said[last]
+            if rtu(whole[:-2].hex()) == whole.hex() and any(part.good for part in heard[first:last]):
+                out.update(range(first, last + 1))
+                break
     return out
 
 

@@ -3,12 +3,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from tests.meaning_modbus import brings, read
 from tests.tools.dalytools.findings.explained import explained
-from tests.tools.dalytools.findings.heard import Frame
+from tests.tools.dalytools.findings.heard import Frame, frames
+from tests.tools.dalytools.findings.injected import EPOCH_NS, Heard, capture
 from tests.tools.dalytools.findings.moments import Moment
 
 from dalytools.findings.finding import Severity
 from dalytools.findings.place import Place
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def heard(seconds: float, address: int, data_id: int, payload: str = "") -> Frame:
@@ -167,3 +174,24 @@ def test_an_answer_without_its_number_0_counts_from_1() -> None:
     )
     newer = [frame._replace(seconds=frame.seconds + 1.5) for frame in usual]
     assert not explained(says, [count, *usual, *shifted, *newer], [note], 11.0)
+
+
+def test_a_reply_of_modbus_with_an_a5_frame_inside_falls_apart(tmp_path: Path) -> None:
+    """Cells of 2.213 V: a5 08 a5 08, and with one of 2.214 V and no more cells the sum is right (records.md 3)."""
+    reply = brings(*[0x08A1] * 8, 0x08A5, 0x08A5, 0x08A6, *[0] * 11)
+    at, pieces = 1.05, (reply[: 2 * 20], reply[2 * 20 : 2 * 33], reply[2 * 33 :])
+    packets = [Heard(1.0, read(0, 22))]
+    for piece in pieces:
+        packets.append(Heard(at, piece))
+        at += len(piece) / 2 / 960
+    apart = frames(
+        capture(tmp_path / "apart.pcapng", [*packets, Heard(3.0, pieces[0]), Heard(3.1, pieces[1])]), EPOCH_NS
+    )
+    assert [frame.falls_apart for frame in apart] == [False, True, True, True, False, False]
+    assert apart[2].good
+    for rule, seconds, told in (("damaged", 1.05, True), ("unasked", 1.07, True), ("damaged", 3.0, False)):
+        moment = Moment(rule, Place(), Severity.WARNING, seconds)
+        assert explained(moment, apart, [], 1.5) is told
+    asked = Moment("unanswered", Place(address=0xD2, register=0), Severity.WARNING, 1.0)
+    assert explained(asked, apart, [], 1.5)
+    assert not explained(asked._replace(seconds=2.5), apart, [], 1.5)

@@ -154,6 +154,21 @@ def test_a_board_that_was_asked_long_before_answers_for_another(tmp_path: Path) 
     assert one(found, "wrong-board").text == "board 4 answered 1 time what board 1 was asked"
 
 
+@pytest.mark.parametrize("gap", [0.03, 2.0])
+def test_lengths_are_not_compared_where_two_asked_at_once(gap: float, tmp_path: Path) -> None:
+    """The board hears the first, the newest gets the reply (records.md 7): two frames, not the app's sixteen."""
+    few = [cells(number, 3300, 3300, 3300) for number in (1, 2)]
+    many = [cells(number, 3300, 3300, 3300) for number in range(1, 17)]
+    packets = [
+        *asked(0, 0x95, *many, host=0x80),
+        *asked(2, 0x95, *few),
+        Heard(4, a5(0x40, 0x95)),
+        *asked(4 + gap, 0x95, *few, host=0x80),
+    ]
+    found = search(capture(tmp_path / "both.pcapng", [*packets, *LATER]))
+    assert ("burst-length" in {finding.rule for finding in found}) is (gap > 1)
+
+
 def test_lengths_of_bursts_are_compared_by_who_asks(tmp_path: Path) -> None:
     """The app gets 16 frames where the PC gets as many as the cells need (field notes, fact 6): that is no change."""
     few = [cells(number, 3300, 3300, 3300) for number in (1, 2)]
