@@ -2,10 +2,10 @@
 --
 -- CAN frames: SocketCAN captures, candump logs, and whatever else Wireshark shows as CAN (docs/wires.md 2).
 --
--- Lua sees a frame's identifier in fields alone, which are not always there (daly_second_look). But a dissector that is
--- registered for an identifier finds it in pinfo.match_uint. So we register for all that can be ours, and nothing of
--- ours runs for other frames. Identifiers that tell Daly from others are registered from the start; the others, some
--- 200,000, once one of those was seen or the user chose us (Decode As).
+-- Lua sees a frame's identifier in fields alone, which are not always there (daly_second_look), and which make every
+-- packet dearer. But a dissector that is registered for an identifier finds it in pinfo.match_uint. So we register for
+-- all that can be ours, and nothing of ours runs for other frames. Identifiers that tell Daly from others are
+-- registered from the start; the others, some 200,000, once one of those was seen or the user chose us (Decode As).
 --
 --   frame --identifier--> us? --daly_can_bus--> what it is --view--> tree, columns
 
@@ -47,9 +47,8 @@ local chosen -- the user chose us for CAN, as far as was seen
 local refused_number, refused_id -- the newest frame that was not taken for ours
 
 local interface_id = Field.new("frame.interface_id")
-local can_id = Field.new("can.id")
-local is_extended = Field.new("can.flags.xtd")
 local is_remote = Field.new("can.flags.rtr")
+local fd_flag = Field.new("canfd.flags.brs")
 
 local extended_ids, standard_ids = DissectorTable.get("can.extended_id"), DissectorTable.get("can.id")
 local next_level = DissectorTable.get("can.subdissector")
@@ -166,14 +165,22 @@ local function refuse(number, id)
   return 0
 end
 
--- The identifier of a frame that the user's choice brought; nil where it is none of ours, or can't be told.
-local function chosen_id(number)
+local EXTENDED = 2 ^ 31 -- in the word of an identifier and its flags
+
+-- The identifier of a frame that the user's choice brought; nil where it is none of ours, or can't be told. `flag`: one
+-- of those in its word, which is read in the order of bytes that makes it one of ours. None is in both, for the bit of
+-- extended ones stands beside the priority.
+local function chosen_id(number, flag)
   if refused_number == number then
     return refused_id
   end
-  local id, extended = can_id(), is_extended()
-  if id and extended and extended.value == (id.value >= ids.STANDARD) then
-    return id.value
+  local word = flag and flag.range
+  for _, value in ipairs(word and { word:uint(), word:le_uint() } or {}) do
+    local extended = value >= EXTENDED
+    local id = value % (extended and ids.EXTENDED or ids.STANDARD)
+    if extended == (id >= ids.STANDARD) and ids.is_ours(id) then
+      return id
+    end
   end
   return nil
 end
@@ -212,9 +219,10 @@ function M.dissect(buffer, pinfo, parent, handle, id)
       return 0 -- its identifier brought it here before
     end
     choose()
-    first, id = true, chosen_id(number)
+    local flag = extract(is_remote)
+    first, id = true, chosen_id(number, flag)
     if not id then
-      if not can_id() then
+      if not (flag or fd_flag()) then
         note_blind(number)
         blind.several = true -- it may be ours, and a second look knows
       end
@@ -252,7 +260,7 @@ function M.dissect(buffer, pinfo, parent, handle, id)
   end
   local from, whole = state, true
   -- Without a tree it was taken for a data frame.
-  local seen = flag or can_id()
+  local seen = flag or fd_flag()
   local not_ours = seen and not flag or remote and id < ids.STANDARD
   local surprise = not_ours or remote and length > 0
   if remote then

@@ -13,8 +13,8 @@ local floor, format, concat = math.floor, string.format, table.concat
 
 M.KEEP_ALIVE = 0x0400FF80
 
--- Identifiers of standard frames are below this; no extended one of ours is.
-M.STANDARD = 0x800
+-- Identifiers of standard frames are below the first of these, and no extended one of ours; all are below the second.
+M.STANDARD, M.EXTENDED = 0x800, 0x20000000
 
 local CLASSIC = 0x18
 local FIRST_READ, LAST_READ = 0x90, 0x98 -- of the paper: they tell Daly from others
@@ -120,6 +120,12 @@ local function classic_ranges(list, first, last)
       end
     end
   end
+end
+
+--- Whether an identifier can be ours, or a foreign one that is known by name.
+function M.is_ours(id)
+  local found = M.shape(id)
+  return (found.classic or found.writes or found.streamed or found.keep_alive or found.foreign) ~= nil
 end
 
 --- Extended identifiers that tell Daly from others, as a range of Wireshark's.

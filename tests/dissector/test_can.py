@@ -4,13 +4,30 @@
 from __future__ import annotations
 
 import re
+import struct
+import sys
 from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from tests.dissector.can_frames import SOCKETCAN, can, canfd, keep_alive, reply, request
-from tests.dissector.dissection import DESTINATION, SOURCE, Dissect, P, Row, expert, info, kinds, number, numbers
+from tests.dissector.dissection import (
+    DESTINATION,
+    EPOCH_NS,
+    SOURCE,
+    Dissect,
+    P,
+    Row,
+    expert,
+    info,
+    kinds,
+    number,
+    numbers,
+)
 from tests.dissector.test_real_frames import NAMES, OF_REQUESTS, ROWS, WORDS
 from tests.dissector.test_views import Sharkd
+
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -315,6 +332,43 @@ def test_the_preference_turns_the_search_off_and_decode_as_on(tshark: Tshark, se
         rows = [line.split("\t") for line in done.stdout.decode().splitlines()]
         assert [row[0] for row in rows] == ["foreign", "frame", "foreign", "", "frame"]
         assert [row[1] for row in rows][::2] == ["Victron/Pylontech", "HKMS or Deye", ""]
+
+
+COOKED, CAN_PROTOCOL = 113, 0x000C  # link type of Linux' cooked captures, whose CAN identifiers are in the host's order
+COOKED_HEADER = struct.pack(">HHHQH", 0, 280, 0, 0, CAN_PROTOCOL).hex()
+
+
+def cooked(frame: P) -> P:
+    """Put a frame as it is in a SocketCAN capture into a cooked one."""
+    identifier = int(frame.hex[:8], 16).to_bytes(4, sys.byteorder)
+    return P(COOKED_HEADER + identifier.hex() + frame.hex[8:], frame.at)
+
+
+@pytest.mark.parametrize("link_type", [SOCKETCAN, COOKED], ids=["SocketCAN", "cooked"])
+@pytest.mark.parametrize(
+    ("first", "shown"),
+    [
+        (can(0x351, "00", flags=""), "foreign\tVictron/Pylontech\t"),
+        (can(0x18500140), "frame\t\t"),
+        (can(0x18500140, flags="extended+remote_transmission_request"), "frame\t\t1"),
+        (can(0x04008001, CELLS[0]), "foreign\tHKMS or Deye\t"),
+        (can(0x18DAF110, "02"), "\t\t"),
+    ],
+    ids=["standard", "classic", "remote", "HKMS", "not ours"],
+)
+def test_the_first_frame_counts_where_the_user_chose_us(
+    tshark: Tshark, open_folder: Path, link_type: int, first: P, shown: str
+) -> None:
+    path = open_folder / "chosen.pcapng"
+    with open_writer(path) as writer:
+        writer.add_interface(Interface("made", "can0", link_type))
+        for frame in (first, can(0x18510140, at=1)):
+            data = (frame if link_type == SOCKETCAN else cooked(frame)).hex
+            writer.write_packet(EPOCH_NS + round(frame.at * 1e9), bytes.fromhex(data))
+    path.chmod(0o644)
+    fields = [word for name in ("kind", "foreign", "can.remote") for word in ("-e", f"daly.{name}")]
+    done = tshark.run("-d", "can.subdissector,daly", "-r", str(path), "-T", "fields", *fields)
+    assert done.stdout.decode().replace("True", "1").splitlines() == [shown, "frame\t\t"]
 
 
 CANDUMP = """\
