@@ -17,12 +17,13 @@ from datetime import UTC, datetime
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dalytools.simulator import modbus
 from dalytools.simulator.battery import Battery
-from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, is_request, request_length, writes
+from dalytools.simulator.board import LIE_IDS, START, SimulatedBoard, request_length, writes
 from dalytools.simulator.harm import harmed, overlaid
+from dalytools.simulator.notes import Notes, about
 from dalytools.simulator.sent import Exchange, Sent
 from dalytools.simulator.stations import NEVER, LateReply, Station, stations
+from dalytools.simulator.tampering import tampered
 from dalytools.simulator.truth import Truth
 
 if TYPE_CHECKING:
@@ -40,11 +41,6 @@ NOISE = "noise"
 _TRICKS = frozenset(
     ("silent", "late", "cut_burst", "skip_frame", "repeat_frame", "other_board", "contradict", "damage")
 )
-
-
-_TAMPERS = ("skip_frame", "cut_burst", "repeat_frame")
-_Tampered = tuple[str, dict[str, int]]
-"""What was done to an answer, and where: for the truth."""
 
 
 class _Trick:
@@ -83,7 +79,7 @@ class Bus:
         self._stations = stations(scenario, list(self.boards), start_ns)
         self._tricks: dict[int, list[_Trick]] = {}
         self._faults: dict[int, frozenset[str]] = {number: frozenset() for number in self.boards}
-        self._seen_faults: dict[tuple[str, int], frozenset[str]] = {}
+        self._notes = Notes(self.truth, lambda: self.now_ns)
         self.now_ns: int = self._next_wish()
         self._note_faults(start_ns)
 
@@ -194,13 +190,13 @@ class Bus:
             return Exchange(sent, False, request_end)
         if request_length(heard) != len(heard) or not heard:
             if request in heard:
-                self._note_unanswered(request, sender, began, "damaged")
+                self._notes.unanswered(request, sender, began, "damaged")
             return Exchange(sent, False, request_end)
         good, complete, why = self._answers(heard, sent)
         if not good:
-            self._note_unanswered(heard, sender, began, why)
+            self._notes.unanswered(heard, sender, began, why)
         if self.truth.on and writes(heard):
-            self._note_write(heard, sender, began, sent[1:])
+            self._notes.write(heard, sender, began, sent[1:])
         return Exchange(sent, complete or why == "echo", request_end)
 
     def _answers(self, request: bytes, sent: list[Sent]) -> tuple[bool, bool, str]:
@@ -223,7 +219,7 @@ class Bus:
             if any(event.what == "silent" for event in tricks):
                 why = "silent"
                 continue
-            frames, tampered = _tampered(answer.frames, tricks)
+            frames, done = tampered(answer.frames, tricks)
             lies = [] if zero else tricks  # zeros say nothing
             name = f"board {number}"
             jitter = board.board.habits.jitter_ms * self.timing.random()
@@ -232,31 +228,31 @@ class Bus:
             if late is not None:
                 due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
                 faults = board.battery.reading.faults
-                begins = partial(self._note_late, number, request, due - int(late.delay_ms * 1e6), tampered)
-                said = partial(self._note_said, number, request, frames, lies, None if zero else faults)
+                begins = partial(self._notes.late, number, request, due - int(late.delay_ms * 1e6), done)
+                said = partial(self._notes.said, number, request, frames, lies, None if zero else faults)
                 self._stations.append(LateReply(due, name, frames, begins, said))
                 why = "late"
                 continue
-            self._note_tampered(number, request, tampered)
+            self._notes.tampered(number, request, done)
             quiet_from = self.now_ns
             self.now_ns += delay_ns
             if asleep:
-                self.truth.note(self.now_ns, "echo", **_about(request), address=request[1])
+                self.truth.note(self.now_ns, "echo", **about(request), address=request[1])
             elif zero:
-                self.truth.note(self.now_ns, "zero_reply", board=number, **_about(request))
+                self.truth.note(self.now_ns, "zero_reply", board=number, **about(request))
             if stranger:  # of zeros or not
-                self.truth.note(self.now_ns, "other_board", board=number, asked=request[1] - 0x3F, **_about(request))
+                self.truth.note(self.now_ns, "other_board", board=number, asked=request[1] - 0x3F, **about(request))
             harm = next((event for event in tricks if event.what == "damage"), None)
             whole, some = self._speak(name, frames, sent, harm, silent_from_ns=quiet_from)
             if asleep:
                 why = "echo" if whole else "damaged"
             elif stranger:
                 if some and not zero:
-                    self._note_faults_seen(number, request, frames, board.battery.reading.faults)
+                    self._notes.faults(number, request, frames, board.battery.reading.faults)
             elif some:
                 good, complete = True, whole
                 faults = board.battery.reading.faults
-                self._note_said(number, request, frames, lies, None if zero else faults)
+                self._notes.said(number, request, frames, lies, None if zero else faults)
             else:
                 why = "damaged"
         return good, complete, why
@@ -303,7 +299,7 @@ class Bus:
                 place = round((reply.time_ns - at) / self._char_ns)
                 if place >= len(data):
                     sent.append(Sent(at, name, data))  # whole, but the board is busy
-                    self._note_unanswered(data, name, at, "busy")
+                    self._notes.unanswered(data, name, at, "busy")
                     return False
                 both = overlaid(data, reply.data, place)
                 sent.append(Sent(at, f"{name}, {reply.sender}", both))
@@ -380,113 +376,6 @@ class Bus:
         if self.truth.on:
             self.truth.note(at_ns, "damaged", sender=sender, how=how, sent=data.hex(), heard=heard.hex())
         return heard
-
-    # What is written down --------------------------------------------------------------------------------------------
-
-    def _note_unanswered(self, request: bytes, sender: str, at_ns: int, why: str) -> None:
-        if self.truth.on:
-            address, first = (request[1], 0x40) if request[0] == START else (request[0], modbus.ASKS_81 + 1)
-            facts = {"host": sender, "address": address, **_about(request), "why": why}
-            board = address - first + 1
-            if 1 <= board <= 16:
-                facts["board"] = board
-            self.truth.note(at_ns, "unanswered", **facts)
-
-    def _note_write(self, request: bytes, sender: str, at_ns: int, replies: list[Sent]) -> None:
-        heard = [piece.data for piece in replies if piece.sender.startswith("board")]
-        reply = heard[0] if heard else b""
-        if request[0] == START:
-            data_id, same = request[2], reply[4:12] == request[4:12]
-            first = request[4] if data_id in {0xD9, 0xDA} else 1
-            if data_id in {0xD9, 0xDA, 0x21}:
-                taken = reply[4:5] == bytes((first,))
-                result = "confirmed" if taken else "denied"
-            else:
-                result = "confirmed" if same and data_id else "answered"
-            facts = {"dialect": "a5", "data_id": data_id, "value": request[4:12].hex()}
-        else:
-            result = "confirmed" if reply[1:2] == request[1:2] and reply[2:6] == request[2:6] else "denied"
-            dialect = "d2" if request[0] == modbus.D2 else "81"
-            facts = {"dialect": dialect, "register": int.from_bytes(request[2:4]), "value": request[4:-2].hex()}
-        self.truth.note(at_ns, "write", host=sender, **facts, result=result if reply else "none")
-
-    def _note_late(self, number: int, request: bytes, meant_ns: int, tampered: list[_Tampered]) -> None:
-        self.truth.note(self.now_ns, "late", board=number, delay_s=(self.now_ns - meant_ns) / 1e9, **_about(request))
-        self._note_tampered(number, request, tampered)
-
-    def _note_tampered(self, number: int, request: bytes, tampered: list[_Tampered]) -> None:
-        for what, facts in tampered:
-            self.truth.note(self.now_ns, what, board=number, data_id=request[2], **facts)
-
-    def _note_said(
-        self, number: int, request: bytes, frames: list[bytes], tricks: list[Event], faults: frozenset[str] | None
-    ) -> None:
-        """Note what a good reply says: contradictions, and faults where it tells them (None: it does not)."""
-        for event in tricks:
-            if event.what == "contradict" and LIE_IDS.get(event.name) == request[2]:
-                self.truth.note(self.now_ns, "contradiction", board=number, name=event.name, **_about(request))
-        if faults is not None:
-            self._note_faults_seen(number, request, frames, faults)
-
-    def _note_faults_seen(self, number: int, request: bytes, frames: list[bytes], faults: frozenset[str]) -> None:
-        """Note what a good reply with the fault bits tells that the one before it did not."""
-        if not self.truth.on:
-            return
-        if request[0] == START:
-            if request[2] != 0x98 or frames[0][2] != 0x98:
-                return
-            key = ("a5", number)
-        else:
-            asked = modbus.parse(request)
-            if asked is None or asked.writes or asked.address != modbus.D2:
-                return
-            if asked.register > 0x3A or asked.register + asked.count < 0x3E:
-                return
-            key = ("d2", number)
-        before = self._seen_faults.get(key)
-        self._seen_faults[key] = faults
-        changes = [("fault_present" if before is None else "fault_raised", faults - (before or frozenset()))]
-        if before is not None:
-            changes.append(("fault_cleared", before - faults))
-        for what, names in changes:
-            for name in sorted(names):
-                self.truth.note(self.now_ns, what, board=number, name=name, dialect=key[0])
-
-
-def _tampered(frames: list[bytes], tricks: list[Event]) -> tuple[list[bytes], list[_Tampered]]:
-    """Leave out or repeat frames of a burst, each by its place in the whole one; return the rest, and what was done.
-
-    One that is left out does not come twice, whichever was asked for first.
-    """
-    done: list[_Tampered] = []
-    places: list[int] = list(range(1, len(frames) + 1))
-    for event in sorted(tricks, key=_order):
-        place = event.frames
-        if event.what not in _TAMPERS or len(places) < 2 or place not in places:
-            continue
-        if event.what == "cut_burst":
-            if place == places[-1]:
-                continue
-            places = [one for one in places if one <= place]
-            done.append(("cut_burst", {"sent": len(places), "of": len(frames)}))
-        elif event.what == "skip_frame":
-            places.remove(place)
-            done.append(("skipped_frame", {"frame": place}))
-        else:
-            places.insert(places.index(place), place)
-            done.append(("repeated_frame", {"frame": place}))
-    return [frames[place - 1] for place in places], done
-
-
-def _order(event: Event) -> int:
-    return _TAMPERS.index(event.what) if event.what in _TAMPERS else 0
-
-
-def _about(request: bytes) -> dict[str, int]:
-    """Return what was asked for."""
-    if is_request(request) or request[:1] == bytes((START,)):
-        return {"data_id": request[2]}
-    return {"register": int.from_bytes(request[2:4])}
 
 
 def traffic(scenario: Scenario, start_ns: int = 0) -> Iterator[Sent]:
