@@ -41,7 +41,7 @@ function M.declare(add)
   add("can.priority", "can.priority", hex(ProtoField.uint8, "Priority", "Bits 24 to 28 of the identifier, 18 of the classic dialect; vendor's article of 2024, section 1"))
   add("can.destination", "can.destination", hex(ProtoField.uint8, "Destination", "Who shall receive: board or host; vendor's article of 2024, section 1"))
   add("can.source", "can.source", hex(ProtoField.uint8, "Source", "Who sends: board or host; vendor's article of 2024, section 1"))
-  add("can.register", "can.register", hex(ProtoField.uint16, "Register", "Bits 16 to 28 of the identifier, HKMS dialect; field notes c.2 [seen once]"))
+  add("can.register", "can.register", hex(ProtoField.uint16, "Register", "Bits 16 to 28 of the identifier, HKMS dialect; field notes c.2 [seen by several]"))
   add("can.remote", "can.remote", boolean("Remote frame", "A frame that asks without bytes of its own; generated"))
 
   -- Fault block of HKMS, register 040E, field notes c.2: levels of three bits, 0 none; and single bits that 0x98 does not have.
@@ -84,6 +84,18 @@ function M.declare(add)
   }) do
     local label = name:gsub("_", " ")
     add("fault." .. name, "fault." .. name, boolean("Fault, " .. label, "1 error, 0 none; HKMS 040E; field notes c.2 [seen once]"))
+  end
+  for _, name in ipairs({
+    "mos_temp_high_level_1",
+    "mos_temp_high_level_2",
+    "board_temp_high_level_1",
+    "board_temp_high_level_2",
+    "thermal_runaway",
+    "balance_communication",
+    "balance_condition",
+  }) do
+    local label = name:gsub("_", " ")
+    add("fault." .. name, "fault." .. name, boolean("Fault, " .. label, "1 error, 0 none; HKMS 0409; field notes c.2 [seen by several]"))
   end
 end
 

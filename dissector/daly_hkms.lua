@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: GPL-2.0-or-later
 --
--- HKMS dialect of CAN: what its registers hold (docs/protocol.md, c.2). Seen once, in
--- patagonaa/esphome-daly-hkms-bms-can. All numbers of several bytes are big-endian, but the balance mask.
+-- HKMS dialect of CAN: what its registers hold (docs/protocol.md, c.2). All numbers of several bytes are big-endian,
+-- but the balance mask.
 --
 --   register (13 bits) | destination | source       b0 b1 b2 b3 b4 b5 b6 b7
 
@@ -9,6 +9,7 @@ local fields = require("daly_fields").fields
 local STATE = require("daly_fields").STATE
 local experts = require("daly_fields").experts
 local classic = require("daly_can_classic")
+local faults = require("daly_faults")
 local hkms_bus = require("daly_hkms_bus")
 local view = require("daly_view")
 
@@ -28,27 +29,51 @@ end
 
 local names = hkms_bus.NAMES
 
--- By register: show(data) adds the fields, words(data) returns the words.
+-- By register: show(data) adds the fields, words(data) returns the words. Both are for frames of `from` bytes at least:
+-- bytes behind those may be missing.
 local show, words = {}, {}
+local from = {
+  [0x0402] = 6,
+  [0x0403] = 6,
+  [0x0404] = 8,
+  [0x0405] = 4,
+  [0x0406] = 3,
+  [0x0407] = 1,
+  [0x0408] = 8,
+  [0x0409] = 8,
+  [0x040A] = 8,
+  [0x040B] = 2,
+  [0x040D] = 7,
+  [0x040E] = 8,
+}
 
--- 0402: voltage.2 current.2 soc.2
+-- 0402: voltage.2 current.2 soc.2 life.1
 show[0x0402] = function(data)
   out.value(fields.pack_voltage, 0, 2, u16(data, 0) / 10, " V")
   out.value(fields.current, 2, 2, (u16(data, 2) - 30000) / 10, " A")
   out.bytes(fields.current_raw, 2, 2)
   out.value(fields.soc, 4, 2, u16(data, 4) / 10, " %")
+  if #data >= 7 then
+    out.bytes(fields.life, 6, 1)
+  end
 end
 
 words[0x0402] = function(data)
   return format("%.1f V  %.1f A  SOC %.1f %%", u16(data, 0) / 10, (u16(data, 2) - 30000) / 10, u16(data, 4) / 10)
 end
 
--- 0403: power.2 energy.2 mos_temperature.1 board_temperature.1
+-- 0403: power.2 energy.2 mos_temperature.1 board_temperature.1 heater_temperature.1 heater_current.1
 show[0x0403] = function(data)
   out.bytes(fields["power"], 0, 2, " W")
   out.bytes(fields["energy"], 2, 2, " Wh")
   out.value(fields["temperature.mos"], 4, 1, byte(data, 5) - 40, " C")
   out.value(fields["temperature.board"], 5, 1, byte(data, 6) - 40, " C")
+  if #data >= 7 then
+    out.value(fields["temperature.heater"], 6, 1, byte(data, 7) - 40, " C")
+  end
+  if #data >= 8 then
+    out.bytes(fields["heater.current"], 7, 1, " A")
+  end
 end
 
 words[0x0403] = function(data)
@@ -75,12 +100,15 @@ words[0x0404] = function(data)
   )
 end
 
--- 0405: max.1 number.1 min.1 number.1
+-- 0405: max.1 number.1 min.1 number.1 difference.1
 show[0x0405] = function(data)
   out.value(fields.temp_max, 0, 1, byte(data, 1) - 40, " C")
   out.bytes(fields.temp_max_number, 1, 1)
   out.value(fields.temp_min, 2, 1, byte(data, 3) - 40, " C")
   out.bytes(fields.temp_min_number, 3, 1)
+  if #data >= 5 then
+    out.bytes(fields["temperature.difference"], 4, 1, " C")
+  end
 end
 
 words[0x0405] = function(data)
@@ -88,12 +116,18 @@ words[0x0405] = function(data)
   return format("max %d C (sensor %d)  min %d C (sensor %d)", max - 40, hottest, min - 40, coldest)
 end
 
--- 0406: charge.1 discharge.1 precharge.1
+-- 0406: charge.1 discharge.1 precharge.1 heater.1 fan.1
 show[0x0406] = function(data)
-  local charge, discharge, precharge = byte(data, 1, 3)
+  local charge, discharge, precharge, heater, fan = byte(data, 1, 5)
   out.value(fields.mos_charge, 0, 1, charge ~= 0)
   out.value(fields.mos_discharge, 1, 1, discharge ~= 0)
   out.value(fields["mos.precharge"], 2, 1, precharge ~= 0)
+  if heater then
+    out.value(fields["heater"], 3, 1, heater ~= 0)
+  end
+  if fan then
+    out.value(fields["fan"], 4, 1, fan ~= 0)
+  end
 end
 
 words[0x0406] = function(data)
@@ -101,9 +135,15 @@ words[0x0406] = function(data)
   return format("charge MOS %s  discharge MOS %s  precharge MOS %s", on(charge), on(discharge), on(precharge))
 end
 
--- 0407: state.1
-show[0x0407] = function()
+-- 0407: state.1 charger.1 load.1
+show[0x0407] = function(data)
   out.bytes(fields.state, 0, 1)
+  if #data >= 2 then
+    out.bytes(fields.charger, 1, 1)
+  end
+  if #data >= 3 then
+    out.bytes(fields.load, 2, 1)
+  end
 end
 
 words[0x0407] = function(data)
@@ -123,6 +163,38 @@ words[0x0408] = function(data)
   local cells, sensors = byte(data, 1, 2)
   local remaining = u16(data, 2) * 65536 + u16(data, 4)
   return format("%d cells  %d sensors  remaining %.0f mAh  %d cycles", cells, sensors, remaining, u16(data, 6))
+end
+
+-- 0409: faults, of which most are those of 0x98. The others: byte, bit, name.
+local MORE_FAULTS = {
+  { 3, 4, "mos_temp_high_level_1" },
+  { 3, 5, "mos_temp_high_level_2" },
+  { 3, 6, "board_temp_high_level_1" },
+  { 3, 7, "board_temp_high_level_2" },
+  { 6, 6, "thermal_runaway" },
+  { 6, 7, "heating" },
+  { 7, 0, "balance_communication" },
+  { 7, 1, "balance_condition" },
+}
+
+show[0x0409] = function(data)
+  for _, bits in ipairs({ faults.BITS, MORE_FAULTS }) do
+    for i = 1, #bits do
+      out.value(fields["fault." .. bits[i][3]], bits[i][1], 1, faults.is_set(data, 1, bits[i]))
+    end
+  end
+end
+
+words[0x0409] = function(data)
+  local set = {}
+  for _, bits in ipairs({ faults.BITS, MORE_FAULTS }) do
+    for i = 1, #bits do
+      if faults.is_set(data, 1, bits[i]) then
+        set[#set + 1] = bits[i][3]
+      end
+    end
+  end
+  return #set > 0 and concat(set, ", ") or "none"
 end
 
 -- The cells of a mask of 32 bits, bit 0 of its first byte is cell 1: { byte, cell, byte, cell, ... }.
@@ -161,6 +233,45 @@ words[0x040A] = function(data)
     byte(data, 1),
     u16(data, 2) - 30000,
     #list > 0 and "cells " .. concat(list, " ") or "no cell"
+  )
+end
+
+local WAKEUPS = { "key", "button", "rs485", "can", "current" } -- bits 0 to 4
+
+-- 040B: minutes.2 wakeup.1
+show[0x040B] = function(data)
+  out.bytes(fields["time_to_full"], 0, 2, " min")
+  local bits = byte(data, 3)
+  for i = 1, bits and #WAKEUPS or 0 do
+    out.value(fields["wakeup." .. WAKEUPS[i]], 2, 1, floor(bits / 2 ^ (i - 1)) % 2 == 1)
+  end
+end
+
+words[0x040B] = function(data)
+  local bits, list = byte(data, 3) or 0, {}
+  for i = 1, #WAKEUPS do
+    if floor(bits / 2 ^ (i - 1)) % 2 == 1 then
+      list[#list + 1] = WAKEUPS[i]
+    end
+  end
+  return format("full in %d min", u16(data, 0)) .. (#list > 0 and "  woken by " .. concat(list, ", ") or "")
+end
+
+-- 040D: active.1 current.2 soh.2 duty.2
+show[0x040D] = function(data)
+  out.value(fields["limit.active"], 0, 1, byte(data) ~= 0)
+  out.value(fields["limit.current"], 1, 2, (u16(data, 1) - 30000) / 10, " A")
+  out.bytes(fields["soh"], 3, 2, " %")
+  out.value(fields["limit.duty"], 5, 2, u16(data, 5) / 10, " %")
+end
+
+words[0x040D] = function(data)
+  return format(
+    "limiter %s  %.1f A  duty %.1f %%  SOH %d %%",
+    on(byte(data)),
+    (u16(data, 1) - 30000) / 10,
+    u16(data, 5) / 10,
+    u16(data, 3)
   )
 end
 
@@ -335,7 +446,7 @@ function M.show(item, frame, wanted)
   if shape.keep_alive then
     return "Keep-alive", source, destination
   end
-  local enough = length == 8 or shape.writes and length >= 2
+  local enough = length >= (shape.writes and 2 or from[register] or 9)
   if wanted and enough and show[register] then
     show[register](data)
   end

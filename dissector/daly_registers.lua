@@ -131,6 +131,8 @@ local R81 = {
   { "temperature.heater",              0x5C, 1, "temperature", " C" },
   { "mileage",                         0x5E, 1, "tenth", " km" },
   { "clock",                           0x61, 3, "clock" },
+  { "uptime.total",                    0xA9, 2, "number", " s" },
+  { "uptime.since_start",              0xAB, 2, "number", " s" },
   { "setting.board_number",            0x100, 1, "number", nil, SETS },
   { "setting.rated_capacity",          0x109, 2, "number", " mAh", SETS },
   { "setting.cell_nominal_voltage",    0x114, 1, "number", " mV", SETS },

@@ -26,8 +26,23 @@ STATUS = "0402000228580003"  # 4 cells, 2 sensors, 0x00022858 = 141400 mAh, 3 cy
 
 #    register, bytes, field: value (by hand)
 VALUES: list[tuple[int, str, dict[str, float]]] = [
-    (0x0402, "020d759e03520000", {"pack.voltage": 52.5, "pack.current": 11.0, "pack.current_raw": 30110, "soc": 85.0}),
-    (0x0403, "02410bb8413c0000", {"power": 577, "energy": 3000, "temperature.mos": 25, "temperature.board": 20}),
+    (
+        0x0402,
+        "020d759e03522a00",
+        {"pack.voltage": 52.5, "pack.current": 11.0, "pack.current_raw": 30110, "soc": 85.0, "life": 42},
+    ),
+    (
+        0x0403,
+        "02410bb8413c5a07",
+        {
+            "power": 577,
+            "energy": 3000,
+            "temperature.mos": 25,
+            "temperature.board": 20,
+            "temperature.heater": 50,
+            "heater.current": 7,
+        },
+    ),
     (
         0x0404,
         "0ce0010cd004 0010",
@@ -41,13 +56,32 @@ VALUES: list[tuple[int, str, dict[str, float]]] = [
     ),
     (
         0x0405,
-        "3e02210100000000",
-        {"temperature.max": 22, "temperature.max_number": 2, "temperature.min": -7, "temperature.min_number": 1},
+        "3e0221011d000000",
+        {
+            "temperature.max": 22,
+            "temperature.max_number": 2,
+            "temperature.min": -7,
+            "temperature.min_number": 1,
+            "temperature.difference": 29,
+        },
     ),
-    (0x0406, "0100010000000000", {"mos.charge": 1, "mos.discharge": 0, "mos.precharge": 1}),
-    (0x0407, "0200000000000000", {"state": 2}),
+    (0x0406, "0100010100000000", {"mos.charge": 1, "mos.discharge": 0, "mos.precharge": 1, "heater": 1, "fan": 0}),
+    (0x0407, "0201010000000000", {"state": 2, "charger": 1, "load": 1}),
     (0x0408, STATUS, {"cell_count": 4, "sensor_count": 2, "remaining_capacity": 141400, "cycles": 3}),
     (0x040A, "010074cc05000080", {"balance.state": 1, "balance.current": -100, "balance.mask": 0x80000005}),
+    (
+        0x040B,
+        "003c0a0000000000",
+        {
+            "time_to_full": 60,
+            "wakeup.key": 0,
+            "wakeup.button": 1,
+            "wakeup.rs485": 0,
+            "wakeup.can": 1,
+            "wakeup.current": 0,
+        },
+    ),
+    (0x040D, "017594006201f400", {"limit.active": 1, "limit.current": 10.0, "soh": 98, "limit.duty": 50.0}),
 ]
 
 
@@ -67,28 +101,64 @@ def test_values(see: Dissect, register: int, data: str, expected: dict[str, floa
         assert numbers(row, "balance.cell") == [1, 3, 32]
 
 
-def test_registers_without_a_layout_are_bytes(see: Dissect) -> None:
-    rows = see(
-        [keep_alive()] + [hkms(register, "0102030405060708", at=1) for register in (0x0409, 0x040B, 0x040C, 0x040D)]
-    )
-    usual = {"kind", "transport", "dialect", "direction", "board", "data"}
-    head = {"can.register", "can.priority", "can.destination", "can.source"}
-    for row in rows[1:]:
-        assert {name for name in row if name.startswith("daly.")} == {f"daly.{name}" for name in usual | head}
+USUAL = {"kind", "transport", "dialect", "direction", "board", "data"}
+HEAD = {"can.register", "can.priority", "can.destination", "can.source"}
 
 
-def test_frames_that_are_not_of_eight_bytes_have_no_values(see: Dissect) -> None:
-    rows = see(
-        [
-            keep_alive(),
-            hkms(0x0402, "020d759e0352", at=0.1),
-            hkms(0x0400, CELLS[0][:14], at=0.2),
-            hkms(0x0408, "", at=0.3),
-        ]
+def values(row: Row) -> set[str]:
+    return {name[5:] for name in row if name.startswith("daly.")} - USUAL - HEAD
+
+
+def test_the_clock_without_a_layout_is_bytes(see: Dissect) -> None:
+    assert values(see([keep_alive(), hkms(0x040C, "0102030405060708", at=1)])[1]) == set()
+
+
+@pytest.mark.parametrize(
+    ("register", "data", "wanted"),
+    [
+        (0x0402, "020d759e03", set[str]()),
+        (0x0402, "020d759e0352", {"pack.voltage", "pack.current", "pack.current_raw", "soc"}),
+        (0x0403, "02410bb8413c5a", {"power", "energy", "temperature.mos", "temperature.board", "temperature.heater"}),
+        (0x0404, "0ce0010cd00400", set[str]()),
+        (0x0406, "010001", {"mos.charge", "mos.discharge", "mos.precharge"}),
+        (0x0406, "01000101", {"mos.charge", "mos.discharge", "mos.precharge", "heater"}),
+        (0x0407, "02", {"state"}),
+        (0x0407, "0201", {"state", "charger"}),
+        (0x0409, "00000000000000", set[str]()),
+        (0x040B, "003c", {"time_to_full"}),
+        (0x040D, "0175940062", set[str]()),
+        (0x0400, CELLS[0][:14], set[str]()),
+        (0x0408, "040200022858", set[str]()),
+    ],
+)
+def test_short_frames_have_the_values_that_are_there(see: Dissect, register: int, data: str, wanted: set[str]) -> None:
+    row = see([keep_alive(), hkms(register, data, at=0.1)])[1]
+    assert kinds([row]) == ["frame"]
+    assert values(row) == wanted
+
+
+def test_a_frame_of_no_bytes(see: Dissect) -> None:
+    row = see([keep_alive(), hkms(0x0408, "", at=0.3)])[1]
+    assert kinds([row]) == ["frame"]
+    assert "daly.data" not in row
+    assert values(row) == set()
+
+
+def test_the_fault_info(see: Dissect) -> None:
+    """0409: byte 2 bit 7; byte 3 bits 4 and 7; byte 6 bits 0, 6, 7; byte 7 bit 1. Nothing is counted."""
+    rows = see([keep_alive(), hkms(0x0409, "000080900000c102", at=0.1), hkms(0x0409, "00" * 8, at=0.2)])
+    shown = {name[6:]: number(rows[1], name) for name in values(rows[1])}
+    assert len(shown) == 50 + 8
+    assert {name for name, value in shown.items() if value} == {
+        *("soc_low_level_2", "mos_temp_high_level_1", "board_temp_high_level_2", "current_module"),
+        *("thermal_runaway", "heating", "balance_condition"),
+    }
+    assert info(rows[1]) == (
+        "Board 1  0x0409 Fault info: soc_low_level_2, current_module, mos_temp_high_level_1, board_temp_high_level_2, "
+        "thermal_runaway, heating, balance_condition"
     )
-    assert kinds(rows) == ["frame"] * 4
-    assert not any(name in row for row in rows for name in ("daly.soc", "daly.cell.voltage", "daly.frame_number"))
-    assert "daly.data" not in rows[3]
+    assert info(rows[2]) == "Board 1  0x0409 Fault info: none"
+    assert not any(number(rows[2], name) for name in values(rows[2]))
 
 
 def test_only_behind_a_keep_alive(see: Dissect) -> None:

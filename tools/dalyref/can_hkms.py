@@ -4,10 +4,11 @@
     bit   28 ........ 16         15 .. 8         7 .. 0
         | register, 13 bits | destination | source |       board: its number; host: 80
 
-    0400FF80   keep-alive, every 2 s: while it comes, every board sends 0400 to 040E by itself
+    0400FF80   keep-alive, every 1 or 2 s: while it comes, every board sends 0400 to 040E by itself
     182A ..    writes of the host
 
-One public reader alone knows this dialect; nothing but that reader confirms it. Nobody asks, so nothing is unasked.
+The vendor's sheet is known from programs that read it (040E and the writes from one alone), and no capture is public.
+Nobody asks, so nothing is unasked.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from dalyref.options import Options
     from dalyref.packet import CanFrame
     from dalyref.streams import Located
-    from dalyref.values import Fields
+    from dalyref.values import Fields, Value
 
 KEEP_ALIVE: Final = 0x0400FF80
 STREAMED: Final = range(0x0400, 0x040F)
@@ -54,23 +55,35 @@ def is_write(identifier: int) -> bool:
     return register(identifier) in WRITES and is_board(identifier >> 8 & 0xFF) and is_host(identifier & 0xFF)
 
 
+def _tail(fields: Fields, data: bytes, *more: tuple[int, str, Callable[[int], Value]]) -> Fields:
+    """Add values of one byte that shorter frames do not have: (place, name, meaning)."""
+    fields.update({f"daly.{name}": meaning(data[at]) for at, name, meaning in more if at < len(data)})
+    return fields
+
+
+def _celsius(raw: int) -> int:
+    return raw - 40
+
+
 def _pack(data: bytes) -> Fields:
     current = int.from_bytes(data[2:4])
-    return {
+    fields: Fields = {
         "daly.pack.voltage": int.from_bytes(data[:2]) / 10,
         "daly.pack.current_raw": current,
         "daly.pack.current": (current - 30000) / 10,
         "daly.soc": int.from_bytes(data[4:6]) / 10,
     }
+    return _tail(fields, data, (6, "life", int))
 
 
 def _power(data: bytes) -> Fields:
-    return {
+    fields: Fields = {
         "daly.power": int.from_bytes(data[:2]),
         "daly.energy": int.from_bytes(data[2:4]),
-        "daly.temperature.mos": data[4] - 40,
-        "daly.temperature.board": data[5] - 40,
+        "daly.temperature.mos": _celsius(data[4]),
+        "daly.temperature.board": _celsius(data[5]),
     }
+    return _tail(fields, data, (6, "temperature.heater", _celsius), (7, "heater.current", int))
 
 
 def _cell_extremes(data: bytes) -> Fields:
@@ -84,24 +97,26 @@ def _cell_extremes(data: bytes) -> Fields:
 
 
 def _temperature_extremes(data: bytes) -> Fields:
-    return {
-        "daly.temperature.max": data[0] - 40,
+    fields: Fields = {
+        "daly.temperature.max": _celsius(data[0]),
         "daly.temperature.max_number": data[1],
-        "daly.temperature.min": data[2] - 40,
+        "daly.temperature.min": _celsius(data[2]),
         "daly.temperature.min_number": data[3],
     }
+    return _tail(fields, data, (4, "temperature.difference", int))
 
 
 def _mos(data: bytes) -> Fields:
-    return {
+    fields: Fields = {
         "daly.mos.charge": bool(data[0]),
         "daly.mos.discharge": bool(data[1]),
         "daly.mos.precharge": bool(data[2]),
     }
+    return _tail(fields, data, (3, "heater", bool), (4, "fan", bool))
 
 
 def _state(data: bytes) -> Fields:
-    return {"daly.state": data[0]}
+    return _tail({"daly.state": data[0]}, data, (1, "charger", int), (2, "load", int))
 
 
 def _counts(data: bytes) -> Fields:
@@ -124,24 +139,44 @@ def _balance(data: bytes) -> Fields:
     return fields
 
 
-def _faults(data: bytes) -> Fields:
+def _charge(data: bytes) -> Fields:
+    fields: Fields = {"daly.time_to_full": int.from_bytes(data[:2])}
+    for woken in data[2:3]:
+        fields.update({f"daly.wakeup.{name}": bool(woken >> bit & 1) for bit, name in enumerate(_WAKEUPS)})
+    return fields
+
+
+def _limits(data: bytes) -> Fields:
+    return {
+        "daly.limit.active": bool(data[0]),
+        "daly.limit.current": (int.from_bytes(data[1:3]) - 30000) / 10,
+        "daly.soh": int.from_bytes(data[3:5]),
+        "daly.limit.duty": int.from_bytes(data[5:7]) / 10,
+    }
+
+
+def _fault_block(data: bytes) -> Fields:
     page = data[0]
-    known = can_hkms_faults.decode(page, data[1:]) if page in (1, 2) else {}
+    known = can_hkms_faults.block(page, data[1:]) if page in (1, 2) else {}
     return {"daly.frame_number": page, **known}
 
 
-_DECODERS: dict[int, Callable[[bytes], Fields]] = {
-    0x0402: _pack,
-    0x0403: _power,
-    0x0404: _cell_extremes,
-    0x0405: _temperature_extremes,
-    0x0406: _mos,
-    0x0407: _state,
-    COUNTS: _counts,
-    0x040A: _balance,
-    0x040E: _faults,
+_WAKEUPS = ("key", "button", "rs485", "can", "current")
+_DECODERS: dict[int, tuple[int, Callable[[bytes], Fields]]] = {
+    0x0402: (6, _pack),
+    0x0403: (6, _power),
+    0x0404: (8, _cell_extremes),
+    0x0405: (4, _temperature_extremes),
+    0x0406: (3, _mos),
+    0x0407: (1, _state),
+    COUNTS: (8, _counts),
+    0x0409: (8, can_hkms_faults.info),
+    0x040A: (8, _balance),
+    0x040B: (2, _charge),
+    0x040D: (7, _limits),
+    0x040E: (8, _fault_block),
 }
-"""By register, of all eight bytes. 0409, 040B, 040C, 040D: no layout is known."""
+"""By register: how many bytes it needs, and what they are. 040C, the clock: no layout is known."""
 
 
 def written(number: int, data: bytes) -> Fields:
@@ -177,11 +212,13 @@ class Hkms:
             fields["daly.write"] = True
             if len(data) >= 2:
                 fields.update(written(number, data))
-        elif not asks and len(data) == 8:
-            if number in _BURSTS:
+        elif not asks and number in _BURSTS:
+            if len(data) == 8:
                 self._part(located, number, source, data, slate)
-            elif decoder := _DECODERS.get(number):
-                fields.update(decoder(data))
+        elif not asks and number in _DECODERS:
+            needed, decode = _DECODERS[number]
+            if len(data) >= needed:
+                fields.update(decode(data))
                 if number == COUNTS:
                     self._take_counts(source, data)
         return slate

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""The fault block of HKMS, register 040E: 14 bytes on two pages (docs/protocol.md, c.2; one source).
+"""The faults of HKMS (docs/protocol.md, c.2): 0409, eight bytes much as 0x98, and the block of 040E (one source).
+
+040E is 14 bytes on two pages:
 
     page 1   bytes 0-6       page 2   bytes 7-13
 
@@ -9,6 +11,8 @@ Levels are three bits, 0 none. A single bit that means what one of 0x98 means ha
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+
+from dalyref import faults
 
 if TYPE_CHECKING:
     from dalyref.values import Fields
@@ -55,7 +59,26 @@ _BITS: dict[int, tuple[str, ...]] = {
 """Bytes 11 to 13; 8 to 10 say nothing."""
 
 
-def decode(page: int, data: bytes) -> Fields:
+_MORE: dict[int, tuple[str, ...]] = {
+    3: ("mos_temp_high_level_1", "mos_temp_high_level_2", "board_temp_high_level_1", "board_temp_high_level_2"),
+    6: ("", "", "thermal_runaway", "heating"),
+    7: ("balance_communication", "balance_condition"),
+}
+"""Of 0409, what 0x98 does not have: byte 3 and 6 from bit 4 on, byte 7 from bit 0 on."""
+
+
+def info(data: bytes) -> Fields:
+    """Decode the eight bytes of 0409: every bit that has a name. Nothing is counted."""
+    fields: Fields = {}
+    for byte, value in enumerate(data):
+        names = faults.TABLE[byte] if byte < len(faults.TABLE) else ()
+        fields.update({f"daly.fault.{name}": bool(value >> bit & 1) for bit, name in enumerate(names)})
+        more = enumerate(_MORE.get(byte, ()), 0 if byte == len(faults.TABLE) else 4)
+        fields.update({f"daly.fault.{name}": bool(value >> bit & 1) for bit, name in more if name})
+    return fields
+
+
+def block(page: int, data: bytes) -> Fields:
     """Decode the seven bytes of page 1 or 2: every level and every bit that has a name."""
     fields: Fields = {}
     for byte, value in enumerate(data, (page - 1) * PAGE):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """The registers of the 81 dialect, requests to 80 + N, replies from 50 + N (docs/protocol.md, d).
 
-    0000-002F cells | 30-37 sensors | 38-73 the pack | 100-16F settings | 178-1A8 texts
+    0000-002F cells | 30-37 sensors | 38-73 the pack | A9-AC uptime | 100-16F settings | 178-1A8 texts
 
 Not read, for sources disagree: 3B, 4F-51, 64; for nobody knows the order of their bytes: 66-69, 6D-73 (faults).
 """
@@ -46,6 +46,8 @@ TOLD: tuple[Row, ...] = (
     (0x5C, 0x5C, "temperature.heater", celsius_not_0),
     (0x5E, 0x5E, "mileage", tenths),  # km
     (0x61, 0x63, "clock", clock),
+    (0xA9, 0xAA, "uptime.total", number),  # s, of its life
+    (0xAB, 0xAC, "uptime.since_start", number),  # s, since it was switched on
     (0x178, 0x17E, "software_version", text),
     (0x17F, 0x185, "hardware_version", text),
     (0x18D, 0x198, "serial_number", text),

@@ -61,7 +61,8 @@ setting.mos_charge setting.mos_discharge setting.soc command password alarm.leve
 alarm.recovery alarm.recovery_delay alarm.discharge alarm.discharge_delay alarm.charge alarm.charge_delay
 balance.active balance.current_raw balance.position balance.state balance.current wakeup.key wakeup.button
 wakeup.rs485 wakeup.can wakeup.current cell.average_voltage cell.difference temperature.difference power
-energy temperature.mos temperature.board temperature.heater mos.precharge heater fan mileage
+energy temperature.mos temperature.board temperature.heater mos.precharge heater heater.current fan mileage
+soh time_to_full uptime.total uptime.since_start limit.active limit.current limit.duty
 software_version_sent hardware_version_sent
 """
 _MODBUS = """
@@ -75,6 +76,8 @@ temp_difference pack_high pack_low charge_current discharge_current soc_low soh_
 thermal_runaway
 """
 _HKMS_FAULTS = """
+mos_temp_high_level_1 mos_temp_high_level_2 board_temp_high_level_1 board_temp_high_level_2
+thermal_runaway balance_communication balance_condition
 smart_charger smart_discharger charge_undervoltage discharge_overvoltage parallel_communication
 afe_communication afe_sampling voltage_detect cell_temp_disconnected flash chg_mos dischg_mos precharge_mos
 heating

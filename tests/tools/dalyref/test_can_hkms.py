@@ -41,25 +41,38 @@ def told(identifier: str, data: str) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("identifier", "data", "expected"),
     [
-        ("04028001", "0214753202bc0000", {"pack.voltage": 53.2, "pack.current_raw": 30002, "pack.current": 0.2,
-                                          "soc": 70.0}),
-        ("04038001", "012c00fa40420000", {"power": 300, "energy": 250, "temperature.mos": 24, "temperature.board": 26}),
+        ("04028001", "0214753202bcff00", {"pack.voltage": 53.2, "pack.current_raw": 30002, "pack.current": 0.2,
+                                          "soc": 70.0, "life": 255}),
+        ("04028001", "0214753202bc", {"pack.voltage": 53.2, "pack.current_raw": 30002, "pack.current": 0.2,
+                                      "soc": 70.0}),
+        ("04028001", "0214753202", {}),
+        ("04038001", "012c00fa40422d03", {"power": 300, "energy": 250, "temperature.mos": 24, "temperature.board": 26,
+                                          "temperature.heater": 5, "heater.current": 3}),
+        ("04038001", "012c00fa4042", {"power": 300, "energy": 250, "temperature.mos": 24, "temperature.board": 26}),
         ("04048001", "0ce0030cde04000f", {"cell.max_voltage": 3296, "cell.max_number": 3, "cell.min_voltage": 3294,
                                           "cell.min_number": 4, "cell.difference": 15}),
-        ("04058001", "3d023b0100000000", {"temperature.max": 21, "temperature.max_number": 2, "temperature.min": 19,
-                                          "temperature.min_number": 1}),
-        ("04068001", "0100020000000000", {"mos.charge": True, "mos.discharge": False, "mos.precharge": True}),
-        ("04078001", "0200000000000000", {"state": 2}),
+        ("04048001", "0ce0030cde0400", {}),
+        ("04058001", "3d023b0102000000", {"temperature.max": 21, "temperature.max_number": 2, "temperature.min": 19,
+                                          "temperature.min_number": 1, "temperature.difference": 2}),
+        ("04058001", "3d023b01", {"temperature.max": 21, "temperature.max_number": 2, "temperature.min": 19,
+                                  "temperature.min_number": 1}),
+        ("04068001", "0100020001000000", {"mos.charge": True, "mos.discharge": False, "mos.precharge": True,
+                                          "heater": False, "fan": True}),
+        ("04068001", "010002", {"mos.charge": True, "mos.discharge": False, "mos.precharge": True}),
+        ("04078001", "0200010000000000", {"state": 2, "charger": 0, "load": 1}),
+        ("04078001", "02", {"state": 2}),
         ("04088001", "10040002285800b6", {"cell_count": 16, "sensor_count": 4, "remaining_capacity": 141400,
                                           "cycles": 182}),
         ("040A8001", "0100759e05008001", {"balance.state": 1, "balance.current": 110, "balance.mask": 0x01800005,
                                           "balance.cell": [1, 3, 24, 25]}),
         ("040A8001", "0000753000000000", {"balance.state": 0, "balance.current": 0, "balance.mask": 0}),
-        ("04098001", "0102030405060708", {}),
-        ("040B8001", "0102030405060708", {}),
+        ("04098001", "00000000000000", {}),
+        ("040B8001", "02d0150000000000", {"time_to_full": 720, "wakeup.key": True, "wakeup.button": False,
+                                          "wakeup.rs485": True, "wakeup.can": False, "wakeup.current": True}),
+        ("040B8001", "02d0", {"time_to_full": 720}),
         ("040C8001", "0102030405060708", {}),
-        ("040D8001", "0102030405060708", {}),
-        ("04028001", "0214753202bc00", {}),  # seven bytes
+        ("040D8001", "0074cc00630000", {"limit.active": False, "limit.current": -10.0, "soh": 99, "limit.duty": 0}),
+        ("040D8001", "0174cc006300", {}),
         ("182A0180", "0001", {"write": True, "setting.mos_charge": True}),
         ("182A0180", "0000000000000000", {"write": True, "setting.mos_charge": False}),
         ("182C0140", "0001", {"write": True, "setting.mos_discharge": True}),
@@ -116,6 +129,20 @@ PAGE_TWO = {"level.mos_temp_high": 4, "level.thermal_runaway": 0} | {
 def test_the_fault_block_has_two_pages() -> None:
     assert told("040E8001", "015380538840ff01") == {"frame_number": 1, **PAGE_ONE}
     assert told("040E8001", "02c4ffffff810280") == {"frame_number": 2, **PAGE_TWO}
+
+
+def test_the_fault_info() -> None:
+    """0409: byte 0 bit 0; byte 3 bits 2, 5, 6; byte 4 bit 7; byte 6 bits 3, 5, 6; byte 7 bit 0."""
+    fields = told("04098001", "0100006480006801")
+    assert len(fields) == 50 + 8
+    assert {name for name, value in fields.items() if value} == {
+        f"fault.{name}"
+        for name in (
+            *("cell_volt_high_level_1", "diff_temp_level_1", "mos_temp_high_level_2", "board_temp_high_level_1"),
+            *("dischg_mos_open_circuit", "low_volt_forbidden_chg", "charging_cabinet_offline", "thermal_runaway"),
+            "balance_communication",
+        )
+    }
 
 
 def test_nothing_is_read_before_the_keep_alive() -> None:

@@ -92,10 +92,14 @@ _TYPES: Final[tuple[tuple[Type, str, str], ...]] = (
         "A",
         """
         pack.current setting.current_drift setting.charge_current_1 setting.charge_current_2
-        setting.discharge_current_1 setting.discharge_current_2 alarm.discharge alarm.charge
+        setting.discharge_current_1 setting.discharge_current_2 alarm.discharge alarm.charge limit.current
         """,
     ),
-    ("double", "%", "soc setting.soc_high_1 setting.soc_high_2 setting.soc_low_1 setting.soc_low_2 setting.soc"),
+    (
+        "double",
+        "%",
+        "soc setting.soc_high_1 setting.soc_high_2 setting.soc_low_1 setting.soc_low_2 setting.soc limit.duty",
+    ),
     ("double", "s", "response_time alarm.delay alarm.recovery_delay alarm.discharge_delay alarm.charge_delay"),
     ("double", "mV", "cells.average"),
     ("double", "C", "sensors.average"),
@@ -122,8 +126,10 @@ _TYPES: Final[tuple[tuple[Type, str, str], ...]] = (
         temperature.heater
         """,
     ),
-    ("int64", "s", "setting.sleep"),
-    ("int32", "A", "setting.short_circuit_current"),
+    ("int64", "s", "setting.sleep uptime.total uptime.since_start"),
+    ("int32", "min", "time_to_full"),
+    ("int32", "%", "soh"),
+    ("int32", "A", "setting.short_circuit_current heater.current"),
     ("int32", "mA", "balance.current setting.balance_current"),
     ("int32", "W", "power"),
     ("int32", "Wh", "energy"),
@@ -138,6 +144,7 @@ _TYPES: Final[tuple[tuple[Type, str, str], ...]] = (
         unknown_id retry unanswered unasked other_board second_host write mos.charge mos.discharge mos.precharge
         di1 di2 di3 di4 do1 do2 do3 do4 burst.repeat burst.cut_off setting.balancer setting.mos_charge
         setting.mos_discharge balance.active wakeup.key wakeup.button wakeup.rs485 wakeup.can wakeup.current heater fan
+        limit.active
         modbus.ambiguous modbus.assumed can.remote
         """,
     ),

@@ -24,14 +24,17 @@ _CLOCK: Final = 0x040C
 _NAMED: Final = {
     0x0400: 7,
     0x0401: 8,
-    0x0402: 6,
-    0x0403: 6,
+    0x0402: 7,
+    0x0403: 8,
     0x0404: 8,
-    0x0405: 4,
-    0x0406: 3,
-    0x0407: 1,
+    0x0405: 5,
+    0x0406: 5,
+    0x0407: 3,
     0x0408: 8,
+    0x0409: 8,
     0x040A: 8,
+    0x040B: 3,
+    0x040D: 7,
     0x040E: 8,
 }
 """Of HKMS: so many bytes, from the first, have a meaning."""

@@ -58,9 +58,9 @@ OPAQUE = frozenset((What.UNKNOWN, What.FOREIGN, What.DAMAGED))
 """Nobody knows what is in there: where it is kept, texts in it are not."""
 
 _HARMLESS = re.compile(
-    r"""(setting|total|balance|wakeup|alarm|pack|cell|temperature|mos)\.\w+
-    | state | soc | life | cycles | charger | load | d[io][1-4] | power | energy | mileage | heater | fan
-    | remaining_capacity | cell_count | sensor_count | firmware_index
+    r"""(setting|total|balance|wakeup|alarm|pack|cell|temperature|mos|heater|limit|uptime)\.\w+
+    | state | soc | soh | life | cycles | charger | load | d[io][1-4] | power | energy | mileage | heater | fan
+    | time_to_full | remaining_capacity | cell_count | sensor_count | firmware_index
     | software_version(_sent)? | hardware_version(_sent)?""",
     re.VERBOSE,
 )

@@ -50,7 +50,7 @@ def test_no_two_columns_have_one_name_even_where_case_does_not_count(columns: tu
 def test_types_and_units_are_those_of_the_dissector(column: Column) -> None:
     kind, about = SAID[column.field]
     assert column.type in TYPES[kind] or (column.words and column.type == "text")
-    units = re.findall(r"(?:^|[ ,])(mV|V|mA|A|mAh|Ah|C|%|s|W|Wh|km)(?=[,;])", f"{about.strip()};")
+    units = re.findall(r"(?:^|[ ,])(mV|V|mA|A|mAh|Ah|C|%|s|min|W|Wh|km)(?=[,;])", f"{about.strip()};")
     if column.field in {"daly.alarm.value", "daly.alarm.recovery"}:
         assert column.unit == ""  # by its class
     elif column.unit:

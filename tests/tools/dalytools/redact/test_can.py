@@ -64,7 +64,7 @@ def test_classic(tmp_path: Path) -> None:
 
 
 def test_hkms(tmp_path: Path) -> None:
-    """0400: byte 7 has no meaning. 040C is the clock. 0402: six bytes have a meaning."""
+    """0400: byte 7 has no meaning. 040C is the clock. 0402: seven bytes have one, 0409 faults."""
     out = redacted(
         tmp_path,
         "0400FF80#0000000000000000",
@@ -72,15 +72,17 @@ def test_hkms(tmp_path: Path) -> None:
         f"040C4001#{CLOCK.hex()}0000",
         "04024001#0210753003294142",
         "182A0180#0001000000000000",
-        f"04094001#{UNKNOWN.hex()}",
+        "04094001#0000800000000001",
+        f"040B4001#003c01{UNKNOWN[3:].hex()}",
     )
     assert out == [
         "0400FF80#0000000000000000",
         "04004001#010ce40ce50ce600",
         "040C4001#0000000000000000",
-        "04024001#0210753003290000",
+        "04024001#0210753003294100",
         "182A0180#0001000000000000",
-        "04094001#0000000000000000",
+        "04094001#0000800000000001",
+        "040B4001#003c010000000000",
     ]
 
 

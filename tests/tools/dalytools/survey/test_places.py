@@ -75,13 +75,13 @@ def test_can_frames_that_nobody_knows(tmp_path: Path) -> None:
         frames.append((poll, 0x18904001, bytes.fromhex("0212000075300271")))
         frames.append((poll + 0.2, 0x18FF50E5, bytes((poll, 1, 2))))
         frames.append((poll + 0.4, 0x0400FF80, bytes(8)))
-        frames.append((poll + 0.5, 0x04098001, bytes((0, poll, 0, 0, 0, 0, 0, 0))))
+        frames.append((poll + 0.5, 0x040C8001, bytes((0, poll, 0, 0, 0, 0, 0, 0))))
     places = surveyed(can_capture(tmp_path / "can.pcapng", frames), tmp_path)
     assert places["board 1 reply 0x90"]["count"] == 50
     unknown = places["CAN 18FF50E5"]
     assert (unknown["group"], unknown["count"], unknown["size"]) == ("unknown", 50, 3)
     assert [claim["kind"] for claim in unknown["claims"]] == ["counter"]
-    hkms = places["board 1 reply register 0409"]
+    hkms = places["board 1 reply register 040C"]
     assert (hkms["dialect"], hkms["group"], hkms["count"]) == ("hkms", "unknown", 50)
 
 
