@@ -155,3 +155,13 @@ def test_a_number_of_a_cell_needs_a_count() -> None:
     assert hidden(note, [heard(1, 2, 0x94, "1803"), says], [note])
     assert hidden(note, [says, heard(6, 1, 0x94, "1803")], [note])
     assert not hidden(note, [heard(1, 1, 0x94, "1803"), says], [note])
+
+
+def test_a_reply_behind_noise_is_an_error_frame_on_can() -> None:
+    note = {"what": "fault_raised", "time": 5.0, "board": 1, "name": "eeprom"}
+    noise = {"what": "damaged", "time": 4.983, "sender": "board 1", "heard": "5ba501980800"}
+    assert hidden(note, [heard(4.9, 0x40, 0x98)], [noise, note])
+    assert not hidden(note, [heard(4.9, 0x40, 0x98), heard(4.987, 1, 0x98)], [noise, note])
+    assert not hidden(note, [heard(4.9, 0x40, 0x98)], [{**noise, "heard": "a5015b980800"}, note])
+    assert not hidden(note, [heard(4.9, 0x40, 0x98)], [{**noise, "time": 4.9}, note])
+    assert not hidden(note, [heard(4.9, 0x40, 0x98)], [note])

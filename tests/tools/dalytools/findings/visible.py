@@ -25,6 +25,9 @@ LATE_S = 0.5
 """From when on ``check`` calls a reply late."""
 MOST_REPLY_S = 0.15
 """A simulated board begins to answer within that."""
+SAID_S = 0.03
+"""A single frame takes 13.5 ms, with noise a little more; what it says is noted at its end."""
+FAULTS = 0x98
 SILENCE_S = 0.25
 NO_BOARD = frozenset((0x80, 0x20))
 D2, ASKS_81, ANSWERS_81 = 0xD2, 0x80, 0x50
@@ -62,6 +65,10 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("other_board", _nothing_came, "what came of it was damaged"),
         ("zero_reply", _may_be_zero, "registers that may all be zero"),
         ("late", _taken_before, "another reply was taken for it: a request is given one late reply (records.md 7)"),
+        *(
+            (what, _reply_is_error_frame, "its reply is an error frame on CAN")
+            for what in ("contradiction", "fault_present", "fault_raised")
+        ),
         ("contradiction", _no_table, "no whole table of its board to hold it against (records.md 11)"),
         ("contradiction", _no_count, "no 0x94 of its board before it (records.md 11)"),
         ("contradiction", _load_stepped, "the load stepped next to it, which explains a voltage"),
@@ -74,6 +81,16 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
 def _is_error_frame(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     damaged = any(other["what"] in {"damaged", "collision"} and other["time"] == note["time"] for other in notes)
     return damaged and not between(heard, at(note) - 1e-6, at(note) + 1e-6)
+
+
+def _reply_is_error_frame(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether the single frame that says it came with noise in front, which CAN does not let through."""
+    mine = (note["board"], note.get("data_id", FAULTS))
+    soon = between(heard, at(note) - SAID_S, at(note) + 1e-3)
+    return not any((frame.address, frame.data_id) == mine for frame in soon) and any(
+        other["what"] == "damaged" and not str(other["heard"]).startswith("a5")
+        for other in during(notes, at(note) - SAID_S, at(note))
+    )
 
 
 def _answered_otherwise(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
