@@ -65,6 +65,7 @@ def test_what_was_damaged_is_hidden_only_where_nothing_of_it_was_heard() -> None
     assert not hidden(note, [Frame(5.0, 13)], [note, {**damaged, "sender": "board 1"}])
     assert not hidden(note, [Frame(5.0, 13)], [note, {**damaged, "time": 4.9}])
     assert not hidden(note, [heard(5.0, 2, 0x90)], [note, damaged])
+    assert hidden(note, [Frame(5.0, 13), heard(5.25, 2, 0x90)], [note, damaged])  # the answer to a newer request
     repeated = {"what": "repeated_frame", "time": 5.0, "board": 2, "data_id": 0x95, "frame": 1}
     assert hidden(repeated, [heard(5.0, 2, 0x95, "01"), Frame(5.0136, 13)], [repeated, damaged])
     assert not hidden(repeated, [heard(5.0, 2, 0x95, "01"), heard(5.0136, 2, 0x95, "01")], [repeated, damaged])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tests.tools.dalytools.findings.heard import A5_SIZE, BURST_QUIET_S, Frame, between, tables
+from tests.tools.dalytools.findings.heard import A5_SIZE, BURST_QUIET_S, BURSTS, Frame, between, tables
 from tests.tools.dalytools.findings.moments import at, during
 from tests.tools.dalytools.findings.own_answers import answers
 
@@ -191,8 +191,9 @@ def _is_of(frame: Frame, note: Note) -> bool:
 
 
 def _nothing_came(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    """Tell whether no frame of it was heard well, for damage."""
-    soon = between(heard, at(note) - 1e-3, at(note) + LONGEST_S)
+    """Tell whether no frame of it was heard well, for damage. Behind a single one comes the next answer."""
+    single = "data_id" in note and note["data_id"] not in BURSTS
+    soon = between(heard, at(note) - 1e-3, at(note) + (1e-3 if single else LONGEST_S))
     return not any(_is_of(frame, note) for frame in soon) and _board_was_damaged(note, notes)
 
 
