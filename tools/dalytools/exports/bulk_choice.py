@@ -27,7 +27,7 @@ def chosen(plan: Plan, files: Sequence[str]) -> list[Column] | None:
         return None
     from dalytools.bulk.left_out import LEFT_OUT
 
-    columns = choose(plan.fields, records.CHOICES)
+    columns = choose(plan.fields, records.CHOICES, records.HEAD)
     for column in columns:
         name = column.field
         if not name or name in LEFT_OUT or name.startswith(_OF_THE_RECORD):

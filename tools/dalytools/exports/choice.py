@@ -17,20 +17,24 @@ if TYPE_CHECKING:
     from dalytools.exports.schema import Column
 
 
-def choose(asked: str, columns: Sequence[Column]) -> list[Column]:
+def choose(asked: str, columns: Sequence[Column], always: Sequence[Column] = ()) -> list[Column]:
     """Return the columns that a list of names means, in the order asked for, each once.
 
-    A name is a field's (``daly.soc``, ``soc``) or a column's (``soc_percent``); ``*`` in it stands for anything. Raises
-    Problem for a name that means none.
+    A name is a field's (``daly.soc``, ``soc``) or a column's (``soc_percent``); ``*`` in it stands for anything. One of
+    `always`, which stand in front in any case, is taken and adds nothing. Raises Problem for a name that means none.
     """
     chosen: dict[str, Column] = {}
     for word in asked.split(","):
         name = word.strip()
         found = _meant(name, columns)
+        if not found and "*" not in name and _meant(name, always):
+            continue
         if not found:
             raise Problem(f"--fields: no column is called {plain(name)!r}{_nearest(name, columns)}")
         for column in found:
             chosen.setdefault(column.name, column)
+    if not chosen:
+        raise Problem(f"--fields: {plain(asked)} is there in any case; name a field too")
     return list(chosen.values())
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from dalytools.redact.fill import filled
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -31,7 +33,7 @@ class Copies:
     def learn(self, raw: bytes) -> None:
         """Remember a value, or a part of one."""
         value = raw.strip(_PADDING)
-        if not legible(value) or value in self.values:
+        if not legible(value) or value in self.values or filled(value):
             return
         if len(self.values) < _MOST_VALUES:
             self.values[value] = None

@@ -16,6 +16,9 @@ from typing import Final
 LETTER: Final = ord("X")
 _PADDING: Final = frozenset(b"\x00\xff\x20")
 _MOST_VALUES: Final = 65536
+_TOLD: Final = 3
+_DIGITS: Final = 2
+"""So many A in front, and no more than so many letters behind, make a text one of ours."""
 
 
 class Fill:
@@ -57,6 +60,14 @@ class Fill:
             new = _letters(number, size) if text else bytes(byte ^ self.other for byte in _bytes(number, size))
             if new != raw:
                 return new
+
+
+def filled(text: bytes) -> bool:
+    """Tell whether a text is what stands in a copy for another, or looks like it: it tells nothing."""
+    letters = bytes(byte for byte in text if byte not in _PADDING)
+    digits = letters.lstrip(b"A")
+    numbered = len(letters) - len(digits) >= _TOLD and len(digits) <= _DIGITS and (digits or b"A").isupper()
+    return numbered or not letters.strip(bytes((LETTER,)))
 
 
 def _blank(raw: bytes) -> bool:

@@ -266,3 +266,19 @@ def test_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     out = capsys.readouterr().out
     (row,) = csv.DictReader(io.StringIO(out))
     assert {name: row[name] for name in TOLD} == TOLD
+
+
+@pytest.mark.parametrize("rows", ["moment", "record", "value"])
+def test_columns_that_are_always_there_may_be_named(
+    rows: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Who names time_UTC, as it stands in the first line, means what is there."""
+    capture = poll(tmp_path / "a.pcapng", 0)
+    for fields in ("daly.soc", "time_UTC,daly.soc", "number,daly.soc,file,interface"):
+        assert decode(capture, "--format", "csv", "--rows", rows, "--fields", fields) == 0
+    out = capsys.readouterr().out
+    third = len(out) // 3
+    assert out == out[:third] * 3
+    assert "soc" in out
+    assert decode(capture, "--format", "csv", "--rows", rows, "--fields", "time_UTC") == 2
+    assert capsys.readouterr().err == "dalyshark decode: --fields: time_UTC is there in any case; name a field too\n"

@@ -120,3 +120,12 @@ def test_a_text_stays_a_text(tmp_path: Path) -> None:
         b"\x02" + b"X" * 7,
         b"\x03" + b"X" * 6 + b"\0",
     ]
+
+
+def test_a_copy_can_be_redacted_again(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    """What was blanked is no secret: the second copy has the first's records, and is written at all."""
+    once, twice = pair[1], tmp_path / "twice.pcapng"
+    redact(str(once), str(twice), Options(), frozenset())
+    assert left(twice.read_bytes()) == []
+    kinds = [(r.kind, len(r.data), r.time_ns, r.number) for r in decode(read_capture(once))]
+    assert kinds == [(r.kind, len(r.data), r.time_ns, r.number) for r in decode(read_capture(twice))]

@@ -26,7 +26,7 @@ from dalyref.decoder import decode
 from dalyref.options import Options
 from dalytools.redact.copies import Copies
 from dalytools.redact.copy import redact
-from dalytools.redact.fill import Fill
+from dalytools.redact.fill import Fill, filled
 from dalytools.redact.labels import Labels, comment
 from dalytools.redact.what import What, named
 
@@ -199,6 +199,16 @@ def test_rtac_serial(tmp_path: Path) -> None:
 )
 def test_fill(raw: bytes, new: bytes, *, text: bool) -> None:
     assert Fill().read(raw, text=text) == new
+
+
+@pytest.mark.parametrize("text", [b"XXXXXX", b"XX XXX", b"AAAA", b"AAAA C", b"AAAABA"])
+def test_what_was_blanked_is_known_again(text: bytes) -> None:
+    assert filled(text)
+
+
+@pytest.mark.parametrize("text", [b"XXXXY", b"AAB", b"AAA1", b"AAAb", b"AAABCD", b"BAAAA"])
+def test_what_was_not_is_not(text: bytes) -> None:
+    assert not filled(text)
 
 
 def test_fill_of_writes_numbers_the_values() -> None:
