@@ -36,7 +36,7 @@ def whole_file(path: str) -> Generator[TextIO]:
 def whole_binary_file(path: str) -> Generator[BinaryIO]:
     """Open `path` for writing bytes, in the same way."""
     place = Path(os.path.realpath(path))
-    beside = place.with_name(f".{place.name}.{os.getpid()}.part")
+    beside = place.parent / f".{place.name}.{os.getpid()}.part"
     try:
         mode = place.stat().st_mode if place.exists() else stat.S_IFREG
         if stat.S_ISDIR(mode):
@@ -44,7 +44,7 @@ def whole_binary_file(path: str) -> Generator[BinaryIO]:
         direct = not stat.S_ISREG(mode)
         out = place.open("wb") if direct else beside.open("xb")
     except OSError as error:
-        raise Problem(f"{path}: cannot be written: {error.strerror}; name another file with -o") from None
+        raise Problem(f"{path}: cannot be written: {error.strerror}; name another file") from None
     try:
         try:
             yield out

@@ -198,11 +198,39 @@ def test_outputs(
 
 @pytest.mark.parametrize(
     ("output", "says"),
-    [("/dev/full", "no space left"), ("none/out", "no such file"), (".", "is a directory"), ("/proc/out", "/proc")],
+    [
+        ("/dev/full", "no space left"),
+        ("none/out", "no such file"),
+        (".", "is a directory"),
+        ("/", "/ is a directory"),
+        ("/proc/out", "/proc"),
+    ],
 )
 def test_outputs_of_decode(output: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["decode", str(CYCLE), "-o", output]) == 2
     assert says in one_line("decode", capsys).lower()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["check", "IN", "--no-dissector", "--json", "OUT", "--junit", "OUT"],
+        ["survey", "IN", "-o", "OUT", "--json", "OUT"],
+        ["simulate", "-w", "OUT", "--truth", "OUT", "--duration", "1"],
+        ["simulate", "SCENARIO", "-w", "OUT", "--truth", "SCENARIO"],
+    ],
+)
+def test_two_outputs_of_one_name_are_refused(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The second would take the place of the first, or of what somebody wrote."""
+    scenario = tmp_path / "scenario.toml"
+    scenario.write_text("seconds = 1\n", encoding="utf-8")
+    places = {"IN": str(CYCLE), "OUT": str(tmp_path / "out"), "SCENARIO": str(scenario)}
+    assert main([places.get(word, word) for word in words]) == 2
+    assert "another" in one_line(words[0], capsys)
+    assert not (tmp_path / "out").exists()
+    assert scenario.read_text(encoding="utf-8") == "seconds = 1\n"
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,8 @@ def _refuse_inputs_as_outputs(args: argparse.Namespace) -> None:
     for name in (args.json, args.junit):
         if name and name != "-" and os.path.realpath(name) in inputs:
             raise Problem(f"{name} is one of the files to read; name another file to write")
+    if args.json and args.junit and os.path.realpath(args.json) == os.path.realpath(args.junit):
+        raise Problem("both --json and --junit would write that file; give one of them another")
 
 
 def _write(name: str | None, text: str) -> None:

@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+from contextlib import nullcontext
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dalycapture.errors import CaptureError
+from dalycapture.reader import read_capture
 from dalyref.decoder import Decoder
 from dalytools import wire_times
 from dalytools.extra import missing
@@ -15,7 +20,7 @@ from dalytools.findings.limits import Limits
 from dalytools.findings.search import Search
 from dalytools.problem import Problem
 from dalytools.progress import progress_bar
-from dalytools.report.collect import Collected
+from dalytools.report.collect import NANO, Collected
 from dalytools.report.page import page
 from dalytools.terminal_text import plain
 from dalytools.whole_file import whole_file
@@ -34,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command line."""
     parser.description = "Write a page with plots and tables of captures: one HTML file, opens offline in any browser."
     parser.epilog = "Exit status: 0 written, 2 could not run, or a file did not read to its end (what did is shown)."
-    parser.add_argument("files", nargs="+", metavar="FILE", help="capture files, in the order of time")
-    parser.add_argument("-o", "--output", metavar="OUT.html", required=True, help="page to write")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="capture files; they are read in the order of time")
+    parser.add_argument("-o", "--output", metavar="OUT.html", required=True, help="page to write; - is standard output")
     parser.add_argument("--title", help="heading of the page (the files' names)")
     choice.add_arguments(parser)
     wire_times.add_arguments(parser)
@@ -51,7 +56,10 @@ def run(args: argparse.Namespace) -> int:
     collected = Collected()
     found: list[tuple[str, Finding]] = []
     problems: list[str] = []
-    for name in files:
+    for begins_ns, name in _by_time(files):
+        if collected.records and begins_ns < collected.begin_ns + int(collected.end * NANO):
+            said = f"{plain(name)} begins before the capture in front of it ends"
+            print(f"dalyshark report: {said}: values of one board share a line", file=sys.stderr)  # noqa: T201
         search = Search(Limits())
         _read(name, args, collected, search, problems)
         found += [(Path(name).name if len(files) > 1 else "", finding) for finding in search.findings()]
@@ -63,9 +71,23 @@ def run(args: argparse.Namespace) -> int:
         raise Problem("no record of a Daly bus in what was read, so no page was written")
     collected.finish()
     title: str = args.title or ", ".join(Path(name).name for name in files[:3]) + (" ..." if len(files) > 3 else "")
-    with whole_file(output) as out:
+    with nullcontext(sys.stdout) if output == "-" else whole_file(output) as out:
         out.write(page(title, collected, found, library))
     return 2 if problems else 0
+
+
+def _by_time(files: list[str]) -> list[tuple[float, str]]:
+    """Return the files in the order of their first packets, with its time, ns; a pipe among them leaves all be."""
+    if len(files) == 1 or not all(Path(name).is_file() or not Path(name).exists() for name in files):
+        return [(math.inf, name) for name in files]
+    return sorted(((_begins_ns(name), name) for name in files), key=itemgetter(0))
+
+
+def _begins_ns(name: str) -> float:
+    try:
+        return next((packet.time_ns for packet in read_capture(name)), math.inf)
+    except CaptureError:
+        return math.inf  # said when it is read
 
 
 def _read(name: str, args: argparse.Namespace, collected: Collected, search: Search, problems: list[str]) -> None:

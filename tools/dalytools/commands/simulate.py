@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from dataclasses import replace
@@ -181,6 +182,10 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(example_text())
         return 0
     made = chosen(args)
+    if args.truth is not None:
+        others = (args.output, args.scenario, args.replay)
+        if os.path.realpath(args.truth) in {os.path.realpath(name) for name in others if name}:
+            raise Problem(f"{args.truth} is named twice; name another file with --truth")
     if args.output:
         if args.replay:
             raise Problem("--replay plays a capture on the tap, and -w writes one: choose one of them")

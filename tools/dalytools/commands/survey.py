@@ -65,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
     for output in outputs:
         if os.path.realpath(output) in {os.path.realpath(name) for name in files}:
             raise Problem(f"{output} is one of the captures; name another file")
+    if args.output and args.json and os.path.realpath(args.output) == os.path.realpath(args.json):
+        raise Problem("both -o and --json would write that file; give one of them another")
     wanted = Wanted.read(args)
     problems: list[str] = []
     sets = [[name] for name in files] if args.diff else [files]

@@ -208,18 +208,26 @@ def _shape(plan: Plan, span_ns: int) -> tuple[Shape, int]:
         case "moment":
             if plan.fields is None:
                 return moments.Moments(span_ns=span_ns), len(moments.HEAD)
-            return moments.Moments(choose(plan.fields, moments.CHOICES, moments.HEAD), span_ns=span_ns), len(moments.HEAD)
+            return moments.Moments(choose(plan.fields, moments.CHOICES, moments.HEAD), span_ns=span_ns), len(
+                moments.HEAD
+            )
         case "value":
-            return values.Values(values.DEFAULT if plan.fields is None else choose(plan.fields, values.CHOICES, values.COLUMNS)), 0
+            return values.Values(
+                values.DEFAULT if plan.fields is None else choose(plan.fields, values.CHOICES, values.COLUMNS)
+            ), 0
         case _:
             if plan.fields is None:
                 return records.Records(), len(records.HEAD)
-            return records.Records(choose(plan.fields, records.CHOICES, records.HEAD), only_with=True), len(records.HEAD)
+            return records.Records(choose(plan.fields, records.CHOICES, records.HEAD), only_with=True), len(
+                records.HEAD
+            )
 
 
 def wanted(plan: Plan) -> frozenset[str] | None:
     """Return the fields that are asked for, for objects; None: all."""
-    return None if plan.fields is None else frozenset(column.field for column in choose(plan.fields, FIELDS, records.HEAD))
+    return (
+        None if plan.fields is None else frozenset(column.field for column in choose(plan.fields, FIELDS, records.HEAD))
+    )
 
 
 def _folder(output: str) -> str | None:

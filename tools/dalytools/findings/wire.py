@@ -37,6 +37,8 @@ _EVENTS = (
 _MOST_SAID = 200
 _A5 = 0xA5
 """How a frame begins: where a capture does so too, it did not join in the middle of one."""
+_LONGEST = 255
+"""Bytes of the longest frame, a Modbus reply: a rest of one is shorter."""
 _CAN = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV, can_foreign.DEYE, can_foreign.AMBIGUOUS))
 _ON_CAN = "a pack may send an inverter's frames by itself: a client must tell them from Daly's by their identifiers"
 _EXAMPLES = 3
@@ -53,6 +55,8 @@ class _Line:
     last: Decoded | None = None
     """A damaged record that was the newest: the end of a capture may have cut it."""
     begun: bool = False
+    rest: Decoded | None = None
+    """What looks like the end of a frame that began before the capture."""
 
 
 @dataclass(slots=True)
@@ -109,10 +113,12 @@ class Wire(Watch):
             if detail != bluetooth_module.NAME:  # of the board itself: nothing strange, and no other device
                 self._foreign[Place(bus, detail=detail)].add(record.number, record.time_ns)
         elif record.kind in _DAMAGED:
-            if line.begun or record.kind is Kind.BAD_CHECKSUM or record.data[0] == _A5:
+            rest = record.kind is not Kind.BAD_CHECKSUM and record.data[0] != _A5 and len(record.data) < _LONGEST
+            if line.begun or not rest:
                 line.last = record
             else:
                 line.total -= len(record.data)  # joined in the middle of a frame
+                line.rest = record
         line.begun = True
 
     @staticmethod
@@ -139,6 +145,9 @@ class Wire(Watch):
     def findings(self) -> Iterator[Finding]:
         """Say how much was damaged, what is not Daly's, and what the capture lacks."""
         for place, line in self._lines.items():
+            if line.rest is not None and not line.total:  # there is nothing else, and no frame is known to have begun
+                line.total = len(line.rest.data)
+                self._count(line, line.rest)
             if line.last is not None and line.last.kind is not Kind.SHORT:  # short: the capture's end cut it
                 self._count(line, line.last)
                 line.last = None

@@ -101,7 +101,8 @@ class Collected:
         self.pauses: list[tuple[float, float]] = []
         """When each began, and how long it was; the longest."""
         self.begin_ns = 0
-        self.end = 0.0
+        """Of the first record; `start` is below 0 where a clock went back behind it."""
+        self.start = self.end = 0.0
 
     def add(self, record: Decoded) -> None:
         """Take the next record."""
@@ -113,7 +114,7 @@ class Collected:
         self.kinds[kind] += 1
         self.over_time.add(time, (kind,))
         self._pause(time)
-        self.end = max(self.end, time)
+        self.start, self.end = min(self.start, time), max(self.end, time)
         fields = record.fields
         self.transports[str(fields.get("daly.transport", ""))] += 1
         if record.kind is Kind.EVENT:

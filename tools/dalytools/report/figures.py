@@ -35,9 +35,10 @@ _STATES = {0: "stationary", 1: "charging", 2: "discharging"}
 class _Rows:
     """Traces, row by row, from the top."""
 
-    def __init__(self, begin_ms: float, end: float) -> None:
-        self._begin_ms = begin_ms
-        self._end = end
+    def __init__(self, collected: Collected) -> None:
+        self._begin_ms = collected.begin_ns / 1e6
+        self._start = collected.start
+        self._end = collected.end
         self._titles: list[tuple[str, dict[str, Any]]] = []
         self.data: list[Trace] = []
 
@@ -67,7 +68,7 @@ class _Rows:
             "xaxis": {
                 "type": "date",
                 "anchor": f"y{count}" if count > 1 else "y",
-                "range": self.times((0, max(self._end, 0.001))),
+                "range": self.times((self._start, max(self._end, self._start + 0.001))),
                 "showspikes": True,
                 "spikemode": "across",
                 "spikethickness": 1,
@@ -100,7 +101,7 @@ class _Rows:
 
 def board_figure(board: BoardSeen, collected: Collected) -> Figure:
     """Return the plots of one board, all that it told about."""
-    rows = _Rows(collected.begin_ns / 1e6, collected.end)
+    rows = _Rows(collected)
     series = board.series
     rows.row("Pack voltage, V", _lines(rows, series, ("voltage",), "V"))
     rows.row("Current, A (sign as sent)", _lines(rows, series, ("current",), "A"))
@@ -123,7 +124,7 @@ def board_figure(board: BoardSeen, collected: Collected) -> Figure:
 
 def bus_figure(collected: Collected) -> Figure:
     """Return the plots of the bus: records by kind, response times, events and pauses."""
-    rows = _Rows(collected.begin_ns / 1e6, collected.end)
+    rows = _Rows(collected)
     columns = collected.over_time.columns()
     length = collected.over_time.length
     bars: list[Trace] = [

@@ -130,8 +130,9 @@ def page(title: str, collected: Collected, found: Sequence[tuple[str, Finding]],
 
 def _head(title: str, collected: Collected) -> str:
     kinds = ", ".join(f"{count} {_text(kind.replace('_', ' '))}" for kind, count in collected.kinds.most_common())
-    begin = datetime.fromtimestamp(collected.begin_ns / 1e9, UTC)
-    span = f"{begin:%Y-%m-%d %H:%M:%S} UTC, {_duration(collected.end)}" if collected.records else "no records"
+    begin = datetime.fromtimestamp(collected.begin_ns / 1e9 + collected.start, UTC)
+    length = _duration(collected.end - collected.start)
+    span = f"{begin:%Y-%m-%d %H:%M:%S} UTC, {length}" if collected.records else "no records"
     spoken = ", ".join(_text(name) for name in (*collected.transports, *collected.dialects) if name)
     left_out = f"; {collected.boards_left_out} replies of further boards left out" if collected.boards_left_out else ""
     return (

@@ -19,7 +19,7 @@ _WORDS = 9  # number of the piece, then time and value of first, lowest, highest
 
 
 class Series:
-    """One quantity. Times in seconds, ascending but for small steps back."""
+    """One quantity. Times in seconds, mostly ascending; one that steps back stands where it belongs."""
 
     __slots__ = ("_length", "_most", "_pieces", "count", "high", "low")
 
@@ -37,13 +37,30 @@ class Series:
         self.high = value if not self.count else max(self.high, value)
         self.count += 1
         pieces, number = self._pieces, time // self._length
+        after = len(pieces)
         if pieces and number <= pieces[-_WORDS]:
-            _join(pieces, len(pieces) - _WORDS, (time, value, time, value, time, value, time, value))
-            return
-        pieces.extend((number, time, value, time, value, time, value, time, value))
+            after = self._behind(number)
+            if after and pieces[after - _WORDS] == number:
+                _join(pieces, after - _WORDS, (time, value, time, value, time, value, time, value))
+                return
+        pieces[after:after] = array("d", (number, time, value, time, value, time, value, time, value))
         while len(pieces) > 2 * self._most * _WORDS:
             self._halve()
             pieces = self._pieces
+
+    def _behind(self, number: float) -> int:
+        """Return where the first piece begins whose number is greater; the newest are looked at first."""
+        pieces = self._pieces
+        low, high = 0, len(pieces) // _WORDS - 1
+        if number == pieces[-_WORDS]:
+            return len(pieces)
+        while low < high:
+            middle = (low + high) // 2
+            if pieces[middle * _WORDS] > number:
+                high = middle
+            else:
+                low = middle + 1
+        return low * _WORDS
 
     def _halve(self) -> None:
         """Make pieces twice as long."""
@@ -73,14 +90,17 @@ class Series:
         return times, values
 
 
-def _join(pieces: array[float], at: int, later: tuple[float, ...]) -> None:
-    """Join what came later (first, lowest, highest, last; time and value each) to the piece that begins at `at`."""
-    _, _, low_time, low, high_time, high, last_time, last = later
+def _join(pieces: array[float], at: int, other: tuple[float, ...]) -> None:
+    """Join what else there was (first, lowest, highest, last; time and value each) to the piece that begins at `at`."""
+    first_time, first, low_time, low, high_time, high, last_time, last = other
+    if first_time < pieces[at + 1]:
+        pieces[at + 1], pieces[at + 2] = first_time, first
     if low < pieces[at + 4]:
         pieces[at + 3], pieces[at + 4] = low_time, low
     if high > pieces[at + 6]:
         pieces[at + 5], pieces[at + 6] = high_time, high
-    pieces[at + 7], pieces[at + 8] = last_time, last
+    if last_time >= pieces[at + 7]:
+        pieces[at + 7], pieces[at + 8] = last_time, last
 
 
 class Counts:

@@ -228,6 +228,21 @@ def test_a_frame_cut_off_at_the_very_beginning_is_damage(tmp_path: Path) -> None
     assert one(search(path), "damaged").tally.first_packet == 1
 
 
+@pytest.mark.parametrize(
+    ("packets", "said"),
+    [
+        ([Heard(0, "37" * 80)], "100.00 % of 80 bytes"),  # a wrong baud rate: nothing but this
+        ([Heard(0, "37" * 300), *asked(6, 0x90, PACK)], "92.02 % of 326 bytes"),  # longer than any frame's rest
+    ],
+)
+def test_junk_that_is_no_rest_of_a_frame_is_damage_at_the_beginning_too(
+    packets: list[Heard], said: str, tmp_path: Path
+) -> None:
+    found = one(search(capture(tmp_path / "junk.pcapng", packets)), "damaged")
+    assert found.severity is Severity.WARNING
+    assert found.text == f"{said} belong to no good frame (1 junk)"
+
+
 def test_a_write_says_what_and_a_password_is_not_told(tmp_path: Path) -> None:
     packets = [*CLEAN, Heard(5, MOS_ON), Heard(5.05, a5(1, 0xD9, "01")), Heard(6, MOS_OFF), Heard(6.05, a5(1, 0xD9))]
     write = one(search(capture(tmp_path / "write.pcapng", packets)), "write")

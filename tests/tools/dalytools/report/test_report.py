@@ -160,3 +160,35 @@ def test_a_sensor_that_is_not_there_has_no_line(tmp_path: Path) -> None:
         "sensor 1": {21},
         "sensor 3": {14},
     }
+
+
+def test_captures_are_put_in_the_order_of_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By name b comes behind a, by time before it: drawn from left to right all the same, and within the axis."""
+    volts = {"a": ("0218", 1_700_000_100), "b": ("0210", 1_700_000_000)}  # 53.6 V, 52.8 V
+    for name, (voltage, second) in volts.items():
+        with open_writer(tmp_path / name) as writer:
+            writer.add_interface(Interface("made", "dalyshark bus=main", 147))
+            body = bytes.fromhex(f"a5019008{voltage}0000753001f4")
+            writer.write_packet(second * 1_000_000_000, body + bytes((sum(body) % 256,)))
+    page = tmp_path / "page.html"
+    assert main(["report", str(tmp_path / "a"), str(tmp_path / "b"), "-o", str(page)]) == 0
+    (trace,) = traces(page, "voltage")
+    assert trace["y"] == [52.8, 53.6]
+    assert trace["x"] == [1_700_000_000_000, 1_700_000_100_000]
+    layout: Any = figures(page)[0]["layout"]
+    assert layout["xaxis"]["range"] == trace["x"]
+    assert capsys.readouterr().err == ""
+
+
+def test_captures_of_one_time_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = [str(SAMPLES / name) for name in ("made-faults.pcapng", "made-poll-cycle.pcapng")]
+    assert main(["report", *names, "-o", str(tmp_path / "page.html")]) == 0
+    assert capsys.readouterr().err == (
+        f"dalyshark report: {names[1]} begins before the capture in front of it ends: "
+        "values of one board share a line\n"
+    )
+
+
+def test_to_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(SAMPLES / "made-faults.pcapng"), "-o", "-"]) == 0
+    assert capsys.readouterr().out.startswith("<!DOCTYPE html>")

@@ -71,3 +71,16 @@ def test_quantiles_are_right_within_one_percent(share: float) -> None:
         quantiles.add(time)
     assert quantiles.at(share) == pytest.approx(times[int(share * len(times)) - 1], rel=0.011)
     assert (quantiles.low, quantiles.high, quantiles.count) == (times[0], times[-1], len(times))
+
+
+@given(st.lists(st.tuples(st.integers(-4000, 4000), st.integers(-9, 9)), min_size=1, max_size=200), st.integers(2, 40))
+def test_what_comes_out_of_order_is_drawn_in_order(given_values: list[tuple[int, int]], most: int) -> None:
+    """Two captures of one time, or a clock that goes back: no line runs backwards, no extreme is lost."""
+    series = Series(most)
+    for time, value in given_values:
+        series.add(time, value)
+    times, values = series.points()
+    assert times == sorted(times)
+    assert (times[0], times[-1]) == (min(given_values)[0], max(given_values)[0])
+    assert (min(values), max(values)) == (min(v for _, v in given_values), max(v for _, v in given_values))
+    assert set(zip(times, values, strict=True)) <= set(given_values)
