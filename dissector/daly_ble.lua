@@ -135,7 +135,7 @@ local function look_again(number, pinfo, raw, length)
     if not blind.several then
       return first, false
     end
-    return number <= blind.last and blind.state or nil, true
+    return number <= blind.last and blind.state or nil, not second_look.is_complete(blind)
   end
   local adapter = adapter_of()
   if blind.last == 0 and number < (began or math.huge) then
@@ -148,7 +148,7 @@ local function look_again(number, pinfo, raw, length)
   local complete = number ~= began or number == blind.early + 1
   local state, anew =
     second_look.look(blind, first, number, adapter, false, read, adapter, number, pinfo, raw, length, not complete)
-  if number == began and complete and blind.state.host.learned ~= learned then
+  if number == began and complete and not blind.several and blind.state.host.learned ~= learned then
     blind.several = true -- what came before tells otherwise
     return blind.state, true
   end

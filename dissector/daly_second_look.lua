@@ -4,7 +4,8 @@
 -- sharkd) Wireshark makes no tree unless a filter needs one, and without a tree nobody can tell a packet's interface,
 -- or other things that only fields hold. Those packets are all taken for one line. A second look knows better: where
 -- there are several lines, or something was not as it was taken, it reads the packets again, in order, as a single pass
--- would. (tshark -2 -Y frame knows at once.) Pure Lua, no Wireshark.
+-- would; from when all are read again, it knows what comes later too. (tshark -2 -Y frame knows at once.) Pure Lua, no
+-- Wireshark.
 
 local M = {}
 
@@ -30,21 +31,27 @@ function M.note(blind, number)
   end
 end
 
+--- Whether all packets were read again.
+function M.is_complete(blind)
+  return blind.last >= blind.newest
+end
+
 --- A second look at a packet, which belongs to `line`; `surprise`: something is not as it was taken. `read(state, ...)`
 -- reads it. Returns the state that it is to be shown from: `first`, what was read at first; the state that was read
--- again, and true; or nil, where packets of several lines were mixed up and this one was not read again.
+-- again, and whether its end is not known yet; or nil, where packets of several lines were mixed up and this one was
+-- not read again.
 function M.look(blind, first, number, line, surprise, read, ...)
   blind.only = blind.only or line
   blind.several = blind.several or line ~= blind.only or surprise
-  local last = blind.last
-  if last < blind.newest and number == (blind.after[last] or last + 1) then
+  local last, complete = blind.last, M.is_complete(blind)
+  if not complete and number == (blind.after[last] or last + 1) then
     read(blind.state, ...)
     blind.last = number
   end
   if not blind.several then
     return first, false
   elseif number <= blind.last then
-    return blind.state, true
+    return blind.state, not complete
   end
   return nil, false
 end

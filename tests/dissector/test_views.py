@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from tests.dissector.dissection import Dissect, P, a5, in_a_row, kinds, number
+from tests.dissector.dissection import EPOCH_NS, Dissect, P, a5, in_a_row, kinds, number
 
+from dalycapture.create import open_writer
+from dalycapture.interface import Interface
 from dalycapture.reader import read_capture
 from dalytools.field_names import FIELD_NAMES
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from dalytools.tshark import Tshark
 
 SAMPLES = sorted(Path(__file__).resolve().parents[2].joinpath("pcap_samples").glob("*.pcap*"))
+WIRES = sorted(Path(__file__).resolve().parents[2].joinpath("pcap_samples", "wires").glob("*.pcap*"))
 LATER = {
     f"daly.{name}" for name in ("reply_in", "unanswered", "burst.cut_off", "reassembled_in")
 }  # known in the second pass only; without a 0x94 the table of all cells is, too (DESIGN 3)
@@ -118,6 +121,47 @@ def test_any_order_shows_the_same(tshark: Tshark, sample: Path) -> None:
         shuffled = packets[:]
         random.Random(7).shuffle(shuffled)
         for packet in shuffled:
+            assert server.tree(packet) == in_order[packet], packet
+    finally:
+        server.close()
+
+
+def test_several_interfaces_are_known_to_their_end_when_all_was_read_again(tshark: Tshark, open_folder: Path) -> None:
+    """sharkd's loading tells no interface; after a look at every packet all is known, what came later too."""
+    path = open_folder / "two.pcapng"
+    with open_writer(path) as writer:
+        for name in ("one", "two"):
+            writer.add_interface(Interface(name, f"dalyshark bus={name}"))
+        for interface, at, packet in (
+            (0, 0, a5(0x40, 0x90)),
+            (1, 0.01, a5(0x40, 0x90)),
+            (1, 0.06, a5(1, 0x90, "020800007530026c")),
+            (0, 2, a5(0x40, 0x91)),
+        ):
+            writer.write_packet(EPOCH_NS + round(at * 1e9), bytes.fromhex(packet), interface=interface)
+    path.chmod(0o644)
+    server = Sharkd(tshark, path)
+    try:
+        for packet in (1, 2, 3, 4):
+            server.tree(packet)
+        assert "No reply" in str(server.tree(1))
+        assert "Reply in: 3" in str(server.tree(2))
+        assert "No reply" not in str(server.tree(2))
+    finally:
+        server.close()
+
+
+@pytest.mark.parametrize("wire", WIRES, ids=lambda path: path.stem)
+def test_a_file_that_is_opened_again_shows_the_same(tshark: Tshark, wire: Path) -> None:
+    server = Sharkd(tshark, wire)
+    try:
+        packets = range(1, server.ask("status")["frames"] + 1)
+        for packet in packets:
+            server.tree(packet)
+        server.ask("setconf", name="daly.tcp_ports", value="8899")
+        server.ask("load", file=str(tshark.readable(wire)))
+        in_order = {packet: server.tree(packet) for packet in packets}
+        for packet in (*packets, *random.Random(7).sample(packets, len(packets))):
             assert server.tree(packet) == in_order[packet], packet
     finally:
         server.close()
