@@ -151,6 +151,9 @@ local function parse(line)
   return seconds, fraction, bytes, only_day
 end
 
+-- What programs of Windows put before a text in UTF-8.
+local MARK = "^\xEF\xBB\xBF"
+
 -- The next line of the file; of a longer one than LONGEST_LINE, a piece. nil at the end.
 local function next_line(file)
   local position = file:seek("cur")
@@ -162,7 +165,8 @@ local function next_line(file)
     local stop = text:find("\n", 1, true)
     if stop then
       file:seek("set", position + stop)
-      return (text:sub(1, stop - 1):gsub("\r$", ""))
+      text = text:sub(1, stop - 1):gsub("\r$", "")
+      return position == 0 and text:gsub(MARK, "") or text
     elseif #text < size or size == LONGEST_LINE then
       return (text:gsub("\r$", ""))
     end

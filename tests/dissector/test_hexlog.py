@@ -79,6 +79,12 @@ def test_ways_to_write_bytes(tshark: Tshark, written: str) -> None:
     assert [row[1] for row in read(tshark, f"1700000000.0 {written}\n")] == ["frame"]
 
 
+@pytest.mark.parametrize("passes", [(), ("-2", "-Y", "frame")], ids=["one", "two"])
+def test_a_byte_order_mark_is_no_text(tshark: Tshark, passes: tuple[str, ...]) -> None:
+    log = f"\ufeff1700000000.0 {REQUEST}\r\n1700000000.05 {REPLY}\r\n"
+    assert [row[1] for row in read(tshark, log, *passes)] == ["frame", "frame"]
+
+
 def test_a_session(tshark: Tshark) -> None:
     log = f"# recorded by hand\n\n1700000000.0 {REQUEST}\n; pause\n// more\n"
     log += f"1700000000.05 {REPLY[:20]}\n1700000000.06 {REPLY[20:]}"
