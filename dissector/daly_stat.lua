@@ -28,10 +28,23 @@ local function collect(number, kind, raw, slot, values, results)
   count = count + 5
 end
 
+-- Rows are of a board's number, which each bus of a capture may have.
+local function words_of_buses(captures)
+  local buses = 0
+  for results in pairs(captures) do
+    buses = buses + #results.buses
+  end
+  if buses < 2 then
+    return ""
+  end
+  return ("%d buses; which of them a board is of, only a filter tells\n"):format(buses)
+end
+
 -- A listener that feeds a report; `draw(text)` is called when it is to be shown. Raises an error for a bad filter.
 local function listen(report, filter, draw)
   local listener = Listener.new("frame", filter ~= "" and filter or nil)
   local counted = report.make()
+  local captures = {} -- results of the records that were counted
   view.tap = collect
   function listener.packet(pinfo)
     if shown_of ~= pinfo.number then
@@ -39,14 +52,15 @@ local function listen(report, filter, draw)
     end
     for i = 1, count, 5 do
       counted:record(pinfo, shown[i], shown[i + 1], shown[i + 2], shown[i + 3], shown[i + 4])
+      captures[shown[i + 4]] = true
     end
     taken = true -- the next record, of the same packet too, is of a new look
   end
   function listener.draw()
-    draw(counted:text())
+    draw(words_of_buses(captures) .. counted:text())
   end
   function listener.reset()
-    counted, taken = report.make(), true
+    counted, captures, taken = report.make(), {}, true
   end
   return listener
 end
@@ -81,16 +95,28 @@ local function open_window(report, filter)
   retap_packets()
 end
 
+-- End the program as Wireshark's own statistics do, when what stands behind -z can't be used.
+local function refuse(argument, why)
+  io.stderr:write(("-z %s: %s\n"):format(argument, why))
+  os.exit(1)
+end
+
 --- Make the commands and the menu; once (some versions load each module twice).
 function M.register()
   for i = 1, #REPORTS do
     local report = REPORTS[i]
     local word = "daly," .. report.name
     register_stat_cmd_arg(word, function(argument)
-      local filter = argument:sub(#word + 2)
-      listen(report, filter, function(text)
+      local comma, filter = argument:match("^(,?)(.*)", #word + 1)
+      if comma == "" and filter ~= "" then -- such as daly,stats
+        refuse(argument, "it is " .. word .. ", or " .. word .. ",FILTER")
+      end
+      local made, problem = pcall(listen, report, filter, function(text)
         print(heading(report, filter) .. text)
       end)
+      if not made then
+        refuse(argument, tostring(problem):match("([^\n]*)%s*$"))
+      end
     end)
     if gui_enabled() then
       register_menu("Daly BMS/" .. report.title, function()

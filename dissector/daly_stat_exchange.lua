@@ -88,8 +88,8 @@ function Report:record(pinfo, kind, raw, slot, _, results)
   end
   self.records, self.bytes = self.records + 1, self.bytes + length
   self.kinds[kind] = (self.kinds[kind] or 0) + 1
-  self.first = self.first or pinfo.rel_ts
-  self.last = pinfo.rel_ts
+  local time = pinfo.rel_ts
+  self.first, self.last = math.min(self.first or time, time), math.max(self.last or time, time)
   if kind ~= "bad_checksum" and not whole then
     return
   end

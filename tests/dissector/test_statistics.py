@@ -32,12 +32,14 @@ def crc(text: str) -> str:
     return with_crc(bytes.fromhex(text)).hex()
 
 
-def capture(tshark: Tshark, packets: Sequence[P]) -> Path:
+def capture(tshark: Tshark, packets: Sequence[P], buses: Sequence[str] = ("main",)) -> Path:
     path = tshark.home / "statistics.pcapng"
     with open_writer(path) as writer:
-        writer.add_interface(Interface("made", "dalyshark bus=main"))
+        for bus in buses:
+            writer.add_interface(Interface("made", f"dalyshark bus={bus}"))
         for packet in packets:
-            writer.write_packet(EPOCH_NS + round(packet.at * 1e9), bytes.fromhex(packet.hex))
+            data = bytes.fromhex(packet.hex)
+            writer.write_packet(EPOCH_NS + round(packet.at * 1e9), data, interface=packet.interface)
     path.chmod(0o644)
     return path
 
@@ -159,6 +161,45 @@ def test_a_filter_picks_packets(tshark: Tshark) -> None:
     text = ask(tshark, capture(tshark, SESSION), "daly,stat,daly.data_id == 0x93")
     assert rows(text) == {("any", "0x93"): ["1", "0", "1", "0", "0", "0"]}
     assert "filter: daly.data_id == 0x93" in text
+
+
+@pytest.mark.parametrize(
+    ("report", "reason"),
+    [
+        ("daly,stat,daly.nosuch == 1", "daly.nosuch"),
+        ("daly,cells,daly.board ==", "daly.board =="),
+        ("daly,faultsx", "it is daly,faults, or daly,faults,FILTER"),
+    ],
+)
+def test_what_can_not_be_used_is_said(tshark: Tshark, report: str, reason: str) -> None:
+    """As of Wireshark's own statistics: a line, and exit status 1."""
+    done = tshark.run("-q", "-z", report, "-r", str(capture(tshark, SESSION)))
+    said = [line for line in done.stderr.decode().splitlines() if line.startswith("-z ")]
+    assert done.returncode == 1
+    assert len(said) == 1
+    assert reason in said[0]
+    assert done.stdout == b""
+
+
+def test_the_time_is_from_the_earliest_to_the_latest(tshark: Tshark) -> None:
+    packets = [P(ASK, 5), P(ANSWER, 5.1), P(ASK, 1), P(ANSWER, 1.1)]
+    assert "52 bytes in 4.100 s" in ask(tshark, capture(tshark, packets), "daly,stat")
+
+
+def test_boards_of_two_buses_have_their_own_faults(tshark: Tshark) -> None:
+    """Both are board 1; that of the one has a fault until its third reply, the other never."""
+    packets = [
+        P(a5(1, 0x98, "01" if bus == 0 and poll < 2 else "00"), poll + bus / 2, bus)
+        for poll in range(4)
+        for bus in (0, 1)
+    ]
+    text = ask(tshark, capture(tshark, packets, ("one", "two")), "daly,faults")
+    told = [line.split() for line in text.splitlines() if "cell_volt" in line]
+    assert [(words[1], words[3]) for words in told] == [("1", "already"), ("5", "cleared")]
+    assert "after 2.000 s" in text
+    assert text.count("Board 1, after 4 replies to 0x98: none") == 2
+    assert "2 buses" in text
+    assert "buses" not in ask(tshark, capture(tshark, packets, ("one", "one")), "daly,faults")
 
 
 def test_several_at_once(tshark: Tshark) -> None:
