@@ -4,10 +4,17 @@
     nRF Connect, 2026-08-26
     I	19:33:31.001	Data written to 0000fff2-0000-1000-8000-00805f9b34fb, value: (0x) D2-03-00-00-00-3E-D7-B9
     I	19:33:31.152	Notification received from 0000fff1-0000-1000-8000-00805f9b34fb, value: (0x) D2-03-7C-..
-    19:33:31.152	Updated Value of Characteristic FFF1 to 0xD2037C..                         on iOS
+
+and on iOS, as text or as a table:
+
+    19:33:31.152	Updated Value of Characteristic FFF1 to 0xD2037C..
+    [19:33:31.0010] Debug: peripheral.writeValue(0xD2030000003ED7B9, for: FFF2, type: .withoutResponse)
+    [19:33:31.1520] Normal: Updated Value of Characteristic FFF1 to D203 7C..
+    19:33:31.1520,DL-D11A04015994,Normal,Updated Value of Characteristic FFF1 to D203 7C..
 
 The date stands in the first line. Values of other characteristics (battery level, device name) are known and left out,
-as are the callbacks that tell the same bytes again. Sources: patman15/BMS_BLE-HA 806, and other public logs of the app.
+as are the callbacks that tell the same bytes again. Sources: patman15/BMS_BLE-HA 806, nordicsemi/IOS-nRF-Connect 174,
+and other public logs of the app; that it tells writes as Nordic's other programs for iOS do is a guess.
 """
 
 from __future__ import annotations
@@ -26,6 +33,12 @@ _VALUE = re.compile(
     r" (?P<uuid>[0-9A-Fa-f-]{4,36}),? value: \(0x\) (?P<hex>[0-9A-Fa-f-]+).{0,100}"
 )
 _IOS = re.compile(r"Updated Value of Characteristic (?P<uuid>[0-9A-Fa-f-]{4,36}) to (?:0x)?(?P<hex>[0-9A-Fa-f ]+)\.?")
+_IOS_WRITE = re.compile(
+    r"peripheral\.writeValue\((?:0x)?(?P<hex>[0-9A-Fa-f ]+), for: (?P<uuid>[0-9A-Fa-f-]{4,36}), type: .{1,40}"
+)
+_IOS_LEVEL = re.compile(
+    r"(?P<table>,?[^,:]{0,60},)?(?:Verbose|Debug|Normal|Info|Application|Warning|Error)(?(table),|:)[ \"]*"
+)
 _OURS = {"fff1", "fff2", "ff01", "ff02"}
 
 
@@ -55,7 +68,11 @@ class NrfConnect(PlainLineLog):
                 self._day_ns += DAY_NS
             self._clock_ns = stamp.ns
             stamp = replace(stamp, what="moment", ns=self._day_ns + stamp.ns)
-        found = _VALUE.fullmatch(rest.strip()) or _IOS.fullmatch(rest.strip())
+        if stamp is not None and (ios := _IOS_LEVEL.match(rest)):
+            level, rest = ios, rest[ios.end() :].rstrip('" ')
+            self._headed = True
+        text = rest.strip()
+        found = _VALUE.fullmatch(text) or _IOS.fullmatch(text) or _IOS_WRITE.fullmatch(text)
         if found:
             data = hex_bytes(found["hex"])
             uuid = found["uuid"].lower()
@@ -64,7 +81,7 @@ class NrfConnect(PlainLineLog):
                 return None
             if short not in _OURS:
                 return []
-            out = "what" in found.groupdict() and found["what"].startswith("Data written")
+            out = found.re is _IOS_WRITE or (found.re is _VALUE and found["what"].startswith("Data written"))
             return [Entry(data, stamp, OUT if out else IN)]
         known = self._headed and (level is not None or stamp is not None or line.startswith((" ", "-", "\t", "DL-")))
         return [] if known or (self._headed and re.match(r"[\w ]{3,60}\(", line)) else None

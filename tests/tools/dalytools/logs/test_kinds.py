@@ -434,6 +434,27 @@ def test_nrf_connect() -> None:
     assert packets[2][0] - packets[1][0] == (4 * HOUR + 26 * 60 * SECOND + 29 * SECOND + 848 * MS)  # the next day
 
 
+@pytest.mark.parametrize("line", ["[{}] {}: {}", "{},DL-D11A04015994,{},{}", '{},DL-D11A04015994,{},"{}"'])
+def test_nrf_connect_on_ios(line: str) -> None:
+    """Shaped after nordicsemi/IOS-nRF-Connect 174; the values are the article's."""
+    told = [
+        ("12:35:26.6520", "Verbose", "Connecting..."),
+        ("12:35:26.9930", "Debug", "[Callback] centralManager(central, didConnect: peripheral)"),
+        ("12:35:28.4710", "Debug", "peripheral.writeValue(0xD203000C000157AA, for: FFF2, type: .withoutResponse)"),
+        ("12:35:28.5720", "Normal", "Updated Value of Characteristic FFF1 to D203 0200 01FC 56."),
+        ("12:35:28.5720", "Application", "Value D203 0200 01FC 56 received."),
+        ("12:35:29.1000", "Normal", "Updated Value of Characteristic 2A19 to 64."),
+    ]
+    kind, packets, importer = read("".join(line.format(*one) + "\n" for one in told))
+    at = 12 * HOUR + 35 * 60 * SECOND + 28 * SECOND
+    assert kind == "nrfconnect"
+    assert packets == [
+        (at + 471 * MS, "outbound", bytes.fromhex("D203000C000157AA")),
+        (at + 572 * MS, "inbound", bytes.fromhex("D203020001FC56")),
+    ]
+    assert importer.tally.not_understood == 0
+
+
 def test_hex_dumps() -> None:
     data = (ASK + ANSWER) * 3 + bytes(64)
     xxd = "".join(f"{at:08x}: {data[at : at + 16].hex(' ', 2):39}  {'.' * 16}\n" for at in range(0, len(data), 16))
