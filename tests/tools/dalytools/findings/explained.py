@@ -118,12 +118,14 @@ def _held(accident: Frame, seconds: float, heard: list[Frame]) -> bool:
 def _counts_from_one(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
     """Tell whether it is told from an answer that lacks its number 0: without damage before it, it counts from 1.
 
-    So says records.md 8; each value then stands one frame too far in front.
+    So says records.md 8; each value then stands one frame too far in front. On CAN no damage is seen.
     """
+    board = moment.place.board
     for note in during(notes, moment.seconds - RECENT_S - 1.0, moment.seconds):
-        if note["what"] != "skipped_frame" or note["board"] != moment.place.board:
+        data_id = _lacks_number_0(note, board)
+        if data_id is None:
             continue
-        mine = [frame for frame in heard if (frame.address, frame.data_id) == (note["board"], note["data_id"])]
+        mine = [frame for frame in heard if (frame.address, frame.data_id) == (board, data_id)]
         first = next((frame for frame in mine if frame.seconds > at(note)), None)
         if (
             first is not None
@@ -134,6 +136,14 @@ def _counts_from_one(moment: Moment, heard: list[Frame], notes: list[Note]) -> b
         ):
             return True
     return False
+
+
+def _lacks_number_0(note: Note, board: int | None) -> int | None:
+    """Return the data ID of an answer of this board that a note takes number 0 from."""
+    if note["what"] == "skipped_frame" and note["board"] == board:
+        return int(str(note["data_id"]))
+    sent = bytes.fromhex(str(note.get("sent", ""))) if note["what"] == "damaged" else b""
+    return sent[2] if len(sent) == A5_SIZE and sent[1] == board and sent[4] == 0 else None
 
 
 def _harmed(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:

@@ -174,6 +174,9 @@ def test_an_answer_without_its_number_0_counts_from_1() -> None:
     )
     newer = [frame._replace(seconds=frame.seconds + 1.5) for frame in usual]
     assert not explained(says, [count, *usual, *shifted, *newer], [note], 11.0)
+    lost = {"what": "damaged", "time": 3.04, "sent": "a5019508000ea80eab0eb60076", "heard": "a5011508"}
+    assert explained(says, [count, *usual, *shifted], [lost], 11.0)  # an error frame on CAN
+    assert not explained(says, [count, *usual, *shifted], [{**lost, "sent": "a5019508010ea80eab0eb60077"}], 11.0)
 
 
 def test_a_reply_of_modbus_with_an_a5_frame_inside_falls_apart(tmp_path: Path) -> None:

@@ -166,3 +166,20 @@ def test_a_reply_behind_noise_is_an_error_frame_on_can() -> None:
     assert not hidden(note, [heard(4.9, 0x40, 0x98)], [{**noise, "heard": "a5015b980800"}, note])
     assert not hidden(note, [heard(4.9, 0x40, 0x98)], [{**noise, "time": 4.9}, note])
     assert not hidden(note, [heard(4.9, 0x40, 0x98)], [note])
+
+
+def test_a_foreign_device_right_behind_damage_may_end_a_frame_by_accident() -> None:
+    """Ten bytes of a reply and the meter's first three sum up right."""
+    note, damaged = {"what": "foreign", "time": 5.0}, {"what": "damaged", "time": 4.957}
+    accident, rest = heard(4.957, 15, 0x95, "030c0000009c0103"), Frame(5.003, 14, first=0)
+    assert hidden(note, [accident, rest], [damaged, note])
+    assert not hidden(note, [accident, Frame(5.0, 17, first=1)], [damaged, note])
+    assert not hidden(note, [accident, rest], [note])
+
+
+def test_a_burst_of_which_nothing_came_shows_no_hole() -> None:
+    note = {"what": "skipped_frame", "time": 5.0, "board": 16, "data_id": 0x95, "frame": 1}
+    damaged = {"what": "damaged", "time": 5.09, "sender": "board 16"}
+    assert hidden(note, [heard(5.6, 16, 0x95, "01")], [note, damaged])
+    assert not hidden(note, [heard(5.09, 16, 0x95, "02")], [note, damaged])
+    assert not hidden(note, [heard(5.6, 16, 0x95, "01")], [note])

@@ -58,9 +58,11 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
         ("collision", _good_by_accident, "its bytes are a good frame by accident"),
+        ("foreign", _swallowed, "damage that is a good frame by accident took its first bytes"),
         ("foreign", _gap_is_mixed, "damaged bytes in the same gap, which so is not whole theirs (records.md 4)"),
         ("repeated_frame", _comes_once, "one of the two frames was damaged"),
         ("cut_burst", _nothing_came, "what came of it was damaged"),
+        ("skipped_frame", _nothing_came, "what came of it was damaged"),
         ("late", _nothing_came, "what came of it was damaged"),
         ("other_board", _nothing_came, "what came of it was damaged"),
         ("zero_reply", _may_be_zero, "registers that may all be zero"),
@@ -113,7 +115,7 @@ def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
 
 
 def _swallowed(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    """Tell whether no packet begins where a request does, and the one before it is a good frame by accident."""
+    """Tell whether no packet begins where that does, and the one before it is a good frame by accident."""
     before = between(heard, at(note) - SILENCE_S, at(note) - 1e-6)
     if not before or not before[-1].good or between(heard, at(note) - 1e-6, at(note) + 1e-6):
         return False
