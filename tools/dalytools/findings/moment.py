@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, tzinfo
 
 _NANO = 1_000_000_000
 
@@ -19,10 +19,10 @@ def iso(time_ns: int) -> str | None:
         return None
 
 
-def clock(time_ns: int) -> str:
-    """Return the local time of day, as ``dalyshark decode`` shows it."""
+def clock(time_ns: int, zone: tzinfo | None = None) -> str:
+    """Return the time of day; without a zone the local one, as ``dalyshark decode`` shows it."""
     seconds, nanos = divmod(time_ns, _NANO)
     try:
-        return f"{datetime.fromtimestamp(seconds).astimezone():%H:%M:%S}.{nanos // 1_000_000:03d}"
+        return f"{datetime.fromtimestamp(seconds, zone).astimezone(zone):%H:%M:%S}.{nanos // 1_000_000:03d}"
     except (OverflowError, OSError, ValueError):
         return "--:--:--.---"

@@ -13,6 +13,7 @@ from dalytools.terminal_text import counted, plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from datetime import tzinfo
 
     from rich.console import Console
 
@@ -89,14 +90,14 @@ def show(findings: Sequence[Finding], to: Console) -> None:
         to.print(f"and {more}; --json FILE has all of them", soft_wrap=True)
 
 
-def when(tally: Tally) -> str:
-    """Say from where to where, in two lines: packets, and times of day."""
+def when(tally: Tally, zone: tzinfo | None = None) -> str:
+    """Say from where to where, a line each: packets, and times of day; without a zone local ones."""
     if not tally.first_packet:
         return "whole file"
     packets = f"packet {tally.first_packet}" if tally.count == 1 else f"{tally.first_packet} .. {tally.last_packet}"
     if not tally.first_ns:
         return packets
-    first, last = clock(tally.first_ns), clock(tally.last_ns)
+    first, last = clock(tally.first_ns, zone), clock(tally.last_ns, zone)
     return f"{packets}\n{first}" if tally.count == 1 else f"{packets}\n{first}\n{last}"
 
 

@@ -53,7 +53,9 @@ _SCRIPT = """
   function colours() {
     var style = getComputedStyle(root), text = style.getPropertyValue('--text').trim();
     var line = style.getPropertyValue('--line').trim(), page = style.getPropertyValue('--page').trim();
-    var change = { 'font.color': text, 'hoverlabel.bgcolor': page, 'hoverlabel.font.color': text };
+    var faint = style.getPropertyValue('--faint').trim();
+    var change = { 'modebar.bgcolor': 'rgba(0,0,0,0)', 'modebar.color': faint, 'modebar.activecolor': text,
+      'font.color': text, 'hoverlabel.bgcolor': page, 'hoverlabel.font.color': text };
     return function (layout) {
       Object.keys(layout).forEach(function (key) {
         if (/^[xy]axis\\d*$/.test(key)) {
@@ -152,7 +154,8 @@ def _found(found: Sequence[tuple[str, Finding]]) -> str:
     advised: set[tuple[str, str]] = set()
     for file, finding in found:
         where = f"{file}: {finding.place}" if file else str(finding.place)
-        moment = when(finding.tally).replace("\n", ", ", 1).replace("\n", " to ")
+        moment = when(finding.tally, UTC).replace("\n", ", ", 1).replace("\n", " to ")
+        moment += " UTC" if finding.tally.first_ns else ""
         faint = [*finding.examples, f"packets {moment}" if moment[0].isdigit() else moment]
         if (finding.rule, finding.advice) not in advised:  # once is enough for people
             faint.append(f"→ {finding.advice}")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,6 +128,19 @@ def test_what_was_found_has_its_time_and_says_what_to_do_once(faults: Path) -> N
     assert re.search(
         r"made-faults.pcapng: board 1, \w+: raised 1 time.*?<div class=\"faint\">packet \d+, \d\d:\d\d:", text
     )
+
+
+def test_times_are_those_of_the_plots_wherever_the_reader_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By hand from the sample: packet 12 at 0.689713203 s; plots have UTC."""
+    monkeypatch.setenv("TZ", "America/New_York")
+    time.tzset()
+    try:
+        page = tmp_path / "page.html"
+        assert main(["report", str(SAMPLES / "made-faults.pcapng"), "-o", str(page)]) == 0
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert ">packet 12, 00:00:00.689 UTC<" in page.read_text("utf-8")
 
 
 def test_a_capture_of_tcp_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
