@@ -45,7 +45,7 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
     if moment.rule == "echo":
         return _repeats_a_collision(moment, heard, notes) or any(
             note["what"] == "unanswered" and note.get("why") == "busy" and same_request(note, seconds, heard)
-            for note in during(notes, seconds - 1e-3, seconds + 1e-3)
+            for note in during(notes, seconds - ECHOES_S, seconds + 1e-3)
         )
     if moment.rule == "modbus-ambiguous":
         return any(

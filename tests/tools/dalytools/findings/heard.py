@@ -41,7 +41,7 @@ class Frame(NamedTuple):
     modbus: bool = False
     """A good frame of Modbus, of an address of Daly's."""
     falls_apart: bool = False
-    """A piece of such a frame with a good A5 frame inside, which ends first and so is the frame (docs/records.md 3)."""
+    """A piece of such a frame with another inside, which ends first and so is the frame (docs/records.md 3)."""
 
     @property
     def good(self) -> bool:
@@ -94,16 +94,16 @@ def frames(path: Path, start_ns: int) -> list[Frame]:
 
 
 def _apart(heard: list[Frame], said: list[bytes]) -> set[int]:
-    """Return the places of packets that together, without a pause, are a good frame of Modbus around one of A5."""
+    """Return the places of packets that together, without a pause, are a good frame of Modbus around another."""
     out: set[int] = set()
     for first, frame in enumerate(heard):
-        if frame.modbus or frame.first not in DALYS_MODBUS:
+        if frame.first not in DALYS_MODBUS:
             continue
         whole, last = said[first], first
         while last + 1 < len(heard) and len(whole) < LONGEST and heard[last + 1].seconds - heard[last].ends < PAUSE_S:
             last += 1
             whole += said[last]
-            if rtu(whole[:-2].hex()) == whole.hex() and any(part.good for part in heard[first:last]):
+            if rtu(whole[:-2].hex()) == whole.hex() and any(part.good or part.modbus for part in heard[first:last]):
                 out.update(range(first, last + 1))
                 break
     return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tests.meaning_modbus import brings, read
+from tests.meaning_modbus import brings, read, rtu
 from tests.tools.dalytools.findings.explained import explained
 from tests.tools.dalytools.findings.heard import Frame, frames
 from tests.tools.dalytools.findings.injected import EPOCH_NS, Heard, capture
@@ -198,3 +198,21 @@ def test_a_reply_of_modbus_with_an_a5_frame_inside_falls_apart(tmp_path: Path) -
     asked = Moment("unanswered", Place(address=0xD2, register=0), Severity.WARNING, 1.0)
     assert explained(asked, apart, [], 1.5)
     assert not explained(asked._replace(seconds=2.5), apart, [], 1.5)
+
+
+def test_a_reply_of_modbus_whose_first_bytes_are_a_request_falls_apart(tmp_path: Path) -> None:
+    """Cells of a reply that are the CRC of the bytes before them (records.md 3: the window that ends first)."""
+    first = bytes.fromhex(rtu("d2037c0e4c0e"))  # byte count 124, cells of 0E4C and of 0Exx
+    reply = rtu((first + bytes(3 + 124 - len(first))).hex())
+    assert len(reply) == 2 * (5 + 124)
+    packets = [Heard(1.0, read(0, 62)), Heard(1.05, first.hex()), Heard(1.05 + 8 / 960, reply[16:])]
+    apart = frames(capture(tmp_path / "apart.pcapng", packets), EPOCH_NS)
+    assert [frame.falls_apart for frame in apart] == [False, True, True]
+
+
+def test_a_request_that_another_host_repeats_within_100_ms_is_an_echo() -> None:
+    note = {"what": "unanswered", "time": 1.0, "address": 0x40, "data_id": 0x93, "why": "busy"}
+    both = [heard(1.0, 0x40, 0x93), heard(1.094, 0x40, 0x93)]
+    assert explained(counted("echo", 1.094), both, [note], 1.5)
+    assert not explained(counted("echo", 1.094), both, [{**note, "why": "silent"}], 1.5)
+    assert not explained(counted("echo", 1.2), [both[0], heard(1.2, 0x40, 0x93)], [note], 1.5)

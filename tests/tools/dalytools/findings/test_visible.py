@@ -88,6 +88,9 @@ def test_damage_that_left_nothing_is_no_good_frame() -> None:
     note = {"what": "damaged", "time": 5.0}
     assert hidden(note, [heard(5.0, 1, 0x90)], [note])
     assert not hidden(note, [heard(6.0, 1, 0x90)], [note])
+    collision = {**note, "what": "collision"}
+    assert hidden(collision, [Frame(4.97, 87, first=0xD2, modbus=True)], [collision])
+    assert not hidden(collision, [Frame(4.97, 87, first=0xD2)], [collision])
 
 
 def test_a_reply_that_two_speaking_at_once_left_whole_is_one() -> None:
@@ -100,6 +103,9 @@ def test_a_reply_that_two_speaking_at_once_left_whole_is_one() -> None:
     assert not hidden(note, [asked, reply._replace(first=0x52)], [note, collision])
     assert not hidden(note, [asked, reply._replace(seconds=1.1)], [note, collision])
     assert not hidden(note, [asked, reply], [note])
+    later = [{**collision, "time": 1.04}]
+    assert hidden(note, [asked, reply], [note, *later])  # the other began in its midst
+    assert not hidden(note, [asked, reply._replace(modbus=False)], [note, *later])
 
 
 def test_a_request_whose_first_bytes_are_of_a_frame_by_accident_is_none() -> None:

@@ -131,7 +131,8 @@ def _left_whole(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
         return False
     answers_from = asked[0].first if asked[0].first == D2 else asked[0].first - ASKS_81 + ANSWERS_81
     length_s = len(str(collisions[0]["heard"])) / 2 / 960
-    both = between(heard, at(collisions[0]), at(collisions[0]) + length_s)
+    began, until = at(collisions[0]), at(collisions[0]) + length_s
+    both = [*there_at(collisions[0], heard), *between(heard, began, until)]
     return any(frame.modbus and frame.first == answers_from for frame in both)
 
 
@@ -211,7 +212,7 @@ def _board_was_damaged(note: Note, notes: list[Note]) -> bool:
 
 def _good_by_accident(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     there = there_at(note, heard)
-    return bool(there) and all(frame.good for frame in there)
+    return bool(there) and all(frame.good or frame.modbus for frame in there)
 
 
 def there_at(note: Note, heard: list[Frame]) -> list[Frame]:
