@@ -59,7 +59,7 @@ add("kind",           "kind",             text("Record",         "What the recor
 add("transport",      "transport",        text("Transport",      "The medium: uart, can, ble, tcp; generated"))
 add("dialect",        "dialect",          text("Dialect",        "a5 (also on CAN), hkms, d2 or 81: which of Daly's protocols; generated"))
 add("undecoded",      "undecoded",        bytes("Bytes",         "Bytes that are shown as they are"))
-add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, Sinowealth with right CRC-8, other frames on a CAN bus, the Bluetooth module's own; generated (docs/wires.md)"))
+add("foreign",        "foreign",          text("Foreign traffic", "Whose traffic it is: Modbus RTU of another address with right CRC, Sinowealth with right CRC-8, Pylontech RS485 and JBD with right sum, other frames on a CAN bus, the Bluetooth module's own; generated (docs/wires.md)"))
 add("continued_in",   "continued_in",     packet("Continued in", frametype.NONE, "Packet in which the record that begins here ends; generated"))
 add("began_in",       "began_in",         packet("Began in",     frametype.NONE, "Packet in which this record began; generated"))
 

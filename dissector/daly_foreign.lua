@@ -4,6 +4,8 @@
 --
 --   Modbus RTU    addr fn ... crc_lo crc_hi      any address that is not Daly's
 --   Sinowealth    0A reg len | data.len crc8     request | reply without a header (field notes b)
+--   Pylontech     "~" ver.2 adr.2 cid.2 cid.2 len.4 info.len sum.4 CR    all digits of hex
+--   JBD           DD . . len data.len sum.2 77
 
 local windows = require("daly_windows")
 
@@ -121,6 +123,39 @@ local function all(buf, first, last, frame_end)
   return true
 end
 
+-- The sum of a run of bytes and a check of 16 bits behind it make a multiple of 65536.
+local function sums_up(buf, first, last, check)
+  local sum = check
+  for i = first, last do
+    sum = sum + byte(buf, i)
+  end
+  return sum % 65536 == 0
+end
+
+local function pylontech_end(buf, p, n)
+  local length = byte(buf, p) == 0x7E and buf:match("^[0-9A-F]+", p + 1)
+  length = length and #length >= 16 and tonumber(length:sub(9, 12), 16) % 4096
+  local check = length and p + 13 + length
+  if not check or check + 4 > n or byte(buf, check + 4) ~= 0x0D then
+    return nil
+  end
+  local digits = buf:sub(p + 1, check + 3)
+  if not digits:find("[^0-9A-F]") and sums_up(buf, p + 1, check - 1, tonumber(digits:sub(-4), 16)) then
+    return check + 4
+  end
+  return nil
+end
+
+local function jbd_end(buf, p, n)
+  local length = p + 6 <= n and byte(buf, p) == 0xDD and byte(buf, p + 3)
+  local check = length and p + 4 + length
+  if not check or check + 2 > n or byte(buf, check + 2) ~= 0x77 then
+    return nil
+  end
+  local high, low = byte(buf, check, check + 1)
+  return sums_up(buf, p + 2, check - 1, high * 256 + low) and check + 2 or nil
+end
+
 --- Name of other makers' Modbus.
 M.MODBUS = "Modbus RTU"
 
@@ -137,12 +172,16 @@ function M.modbus_frames(raw)
   end
 end
 
---- What buf[first..last] is when it is, whole, other people's traffic: "Modbus RTU", "Sinowealth", or nil.
+--- What buf[first..last] is when it is, whole, other people's traffic: its name, or nil.
 function M.name(buf, first, last)
   if all(buf, first, last, modbus_end) then
     return M.MODBUS
   elseif all(buf, first, last, sinowealth_end) then
     return "Sinowealth"
+  elseif all(buf, first, last, pylontech_end) then
+    return "Pylontech RS485"
+  elseif all(buf, first, last, jbd_end) then
+    return "JBD"
   end
   return nil
 end

@@ -83,6 +83,16 @@ def with_crc8(body: bytes) -> bytes:
     return body + bytes((crc,))
 
 
+def _pylontech(carried: bytes) -> bytes:
+    text = b"20024600%04X" % (2 * len(carried)) + carried.hex().upper().encode()
+    return b"~%b%04X\r" % (text, -sum(text) & 0xFFFF)
+
+
+def _jbd(first: int, second: int, carried: bytes) -> bytes:
+    body = bytes((second, len(carried))) + carried
+    return bytes((0xDD, first)) + body + (-sum(body) & 0xFFFF).to_bytes(2) + b"w"
+
+
 class Traffic:
     """An endless bus of trouble."""
 
@@ -244,7 +254,7 @@ class Traffic:
 
     def _others(self) -> bytes:
         r = self.r
-        style = r.randrange(5)
+        style = r.randrange(7)
         address = r.choice((1, 2, 17, 0xF7))
         match style:
             case 0:
@@ -255,6 +265,12 @@ class Traffic:
                 return with_crc(bytes((address, 6, 0, 1, 0, 5))) * r.choice((1, 2))
             case 3:
                 return with_crc8(bytes((0x0A, r.randrange(1, 23), 2)) + r.randbytes(2))
+            case 4:
+                return b"".join(_pylontech(bytes(r.choice(BYTES) for _ in range(n))) for n in (0, r.randrange(9)))
+            case 5:
+                return _jbd(0xA5, 3, b"") + _jbd(
+                    r.choice((3, 0xA5)), 0, bytes(r.choice(BYTES) for _ in range(r.randrange(30)))
+                )
             case _:
                 return bytes((0x0A, r.randrange(1, 24), r.choice((2, 4, 3))))
 

@@ -33,6 +33,11 @@ same(hi * 256 + lo, 0x4B37, "check value")
 same(foreign.name(bytes("0a010 20d03fd"), 1, 6), "Sinowealth", "sino-0")
 same(foreign.name(bytes("0a0b02340d0f"), 1, 6), "Sinowealth", "sino-1")
 
+-- A request and a reply of JBD, a request of Pylontech: checks that the real frames have.
+same(foreign.name(bytes("dda50300fffd77"), 1, 7), "JBD", "jbd-req")
+same(foreign.name("~20024600800800000000FC22\r", 1, 26), "Pylontech RS485", "pylon")
+same(foreign.name("~20024600800800000000fC22\r", 1, 26), nil, "small letters")
+
 -- Conservation and independence of chunking, on pseudo-random streams with real beginnings in them.
 local seed = 12345
 local function random(n)
@@ -47,6 +52,8 @@ local PIECES = {
   bytes("010300000002c40b"),
   bytes("0a01020d03fd"),
   bytes("a501950802"),
+  bytes("dda50300fffd77"),
+  "~250F46900000FD90\r",
   bytes("a5a5a508a50108"),
   bytes("d203faa5"),
 }

@@ -12,6 +12,9 @@ ANSWER = "a501900802100000753001f4ea"  # tano-90-1: 52.8 V, 0 A, 50 %
 READ = "d203000c000157aa"  # doc-rd-req
 FOREIGN = "010300000002c40b"  # read two registers of slave 1; CRC as any Modbus manual has it
 SINO = "0a01020d03fd"  # sino-0: request and reply
+PYLONTECH = b"~20024600800800000000FC22\r".hex()  # pylon, pace, jbd-req of more-real-frames.jsonl
+PACE = b"~250F46900000FD90\r".hex()
+JBD = "dda50300fffd77"
 
 # A good A5 frame in whose data another one begins: W = A5 40 90 08 .. A5 01 90 08 .. | sum, V from the inner A5 on.
 # What lies behind W makes V good: a cut-off request and the real reply behind it, whose sums are right by accident.
@@ -66,6 +69,22 @@ CASES = {
     "Sinowealth": ([SINO], ["foreign"]),
     "Sinowealth request": (["0a0102"], ["foreign"]),
     "Sinowealth with a wrong CRC-8": (["0a01020d03fe"], ["junk"]),
+    "Pylontech": ([PYLONTECH], ["foreign"]),
+    "Pylontech, twice": ([PYLONTECH + PACE], ["foreign"]),
+    "Pylontech between frames": ([ASK + PYLONTECH + ANSWER], ["frame+foreign+frame"]),
+    "Pylontech in two packets": ([PACE[:20], PACE[20:]], ["", "foreign"]),
+    "Pylontech with a wrong sum": ([PACE[:-4] + "310d"], ["junk"]),
+    "Pylontech without its end": ([PACE[:-2]], ["junk"]),
+    "Pylontech, other end": ([PACE[:-2] + "0a"], ["junk"]),
+    "Pylontech, longer than it says": ([PACE[:-10] + "30" + PACE[-10:]], ["junk"]),
+    "JBD": ([JBD], ["foreign"]),
+    "JBD, asked and answered": ([JBD + "dd0300024849ff6d77"], ["foreign"]),
+    "JBD between frames": ([ASK + JBD + ANSWER], ["frame+foreign+frame"]),
+    "JBD with a wrong sum": (["dda50300fffc77"], ["junk"]),
+    "JBD without its end": ([JBD[:-2]], ["junk"]),
+    "JBD, other end": ([JBD[:-2] + "78"], ["junk"]),
+    "JBD, a frame of Daly inside": (["dd03000d" + ASK + "fdf977"], ["junk+frame+junk"]),
+    "two makers in one gap": ([JBD + PACE], ["junk"]),
     "another maker's Modbus between frames": ([ASK + FOREIGN + ANSWER], ["frame+foreign+frame"]),
     "a frame whose sum is A5, alone": ([a5(0x40, 0x90, "28")], ["frame"]),
     "a frame whose sum is A5, and another": ([a5(0x40, 0x90, "28"), ANSWER], ["frame", "frame"]),

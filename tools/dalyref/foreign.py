@@ -3,15 +3,22 @@
 
     Modbus RTU    frames end to end, any address but Daly's, right CRC, a length that the function allows
     Sinowealth    request | 0A | register 01..16 | length 02, 04 |    reply | length bytes | crc-8 |
+    Pylontech     | 7E | 8 digits | 4: how many to come | digits | 4: sum | 0D |    digits of hex in ASCII
+    JBD           | DD | any | any | length | bytes | sum, 2 | 77 |
 
 Sinowealth boards: field notes, section b. The CRC-8 (polynomial 07, start 00) runs over request and reply together.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Final
+
 from dalyref import modbus
 
-MODBUS, SINOWEALTH = "Modbus RTU", "Sinowealth"
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MODBUS, SINOWEALTH, PYLONTECH, JBD = "Modbus RTU", "Sinowealth", "Pylontech RS485", "JBD"
 LONGEST = 4096
 """A run of more bytes is not named."""
 
@@ -84,14 +91,69 @@ def sinowealth_step(data: bytes, at: int, end: int, *, ended: bool) -> int:
     return behind  # what follows must be another request, or nothing
 
 
+_PYLONTECH_START, _PYLONTECH_END, _DIGITS = 0x7E, 0x0D, frozenset(b"0123456789ABCDEF")
+PYLONTECH_HEAD: Final = 13
+"""Bytes before what a Pylontech frame carries: 7E, version, address, two commands, length."""
+JBD_HEAD: Final = 4
+"""Bytes before what a JBD frame carries: DD, two that say what it is, length."""
+
+
+def complement(data: bytes) -> int:
+    """Return the two's complement of the sum of the bytes, 16 bits: the check of Pylontech and of JBD."""
+    return -sum(data) & 0xFFFF
+
+
+def pylontech_step(data: bytes, at: int, end: int) -> int:
+    """Return where the frame at `at` ends, _MAYBE where bytes are missing, _DEAD where there is none."""
+    if data[at] != _PYLONTECH_START:
+        return _DEAD
+    head = data[at + 1 : min(end, at + PYLONTECH_HEAD)]
+    if not _DIGITS.issuperset(head):
+        return _DEAD
+    if len(head) < PYLONTECH_HEAD - 1:
+        return _MAYBE
+    check = at + PYLONTECH_HEAD + (int(head[-4:], 16) & 0x0FFF)
+    if end < check + 5:
+        return _MAYBE
+    whole = data[at + 1 : check + 4]
+    good = (
+        data[check + 4] == _PYLONTECH_END
+        and _DIGITS.issuperset(whole)
+        and complement(whole[:-4]) == int(whole[-4:], 16)
+    )
+    return check + 5 if good else _DEAD
+
+
+def jbd_step(data: bytes, at: int, end: int) -> int:
+    """Return where the frame at `at` ends, _MAYBE where bytes are missing, _DEAD where there is none."""
+    if data[at] != 0xDD:
+        return _DEAD
+    if end - at < JBD_HEAD:
+        return _MAYBE
+    check = at + JBD_HEAD + data[at + 3]
+    if end < check + 3:
+        return _MAYBE
+    good = data[check + 2] == 0x77 and complement(data[at + 2 : check]) == int.from_bytes(data[check : check + 2])
+    return check + 3 if good else _DEAD
+
+
+_STEPS: dict[str, Callable[[bytes, int, int], int]] = {
+    MODBUS: modbus_step,
+    PYLONTECH: pylontech_step,
+    JBD: jbd_step,
+}
+_MAKERS = (MODBUS, SINOWEALTH, PYLONTECH, JBD)
+
+
 class Run:
     """Judges one run of bytes that may still grow. What was read once is not read again."""
 
-    __slots__ = ("_modbus", "_sinowealth")
+    __slots__ = ("_done",)
 
     def __init__(self) -> None:
-        self._modbus = 0  # how far, from the run's beginning, it is other people's; _DEAD: it is not
-        self._sinowealth = 0
+        self._done = dict.fromkeys(
+            _MAKERS, 0
+        )  # how far, from the run's beginning, it is this maker's; _DEAD: it is not
 
     def judge(self, data: bytes, start: int, end: int, *, ended: bool) -> str | None:
         """Name the run ``data[start:end]``; "" where it is nothing known, None where more bytes must tell.
@@ -99,21 +161,23 @@ class Run:
         `ended` says that the run ends at `end`: then the answer is never None.
         """
         if end - start > LONGEST:
-            self._modbus = self._sinowealth = _DEAD
-        self._modbus = done = self._walk(data, start, end, self._modbus, ended=ended, sinowealth=False)
-        if ended and done == end - start:
-            return MODBUS
-        self._sinowealth = done = self._walk(data, start, end, self._sinowealth, ended=ended, sinowealth=True)
-        if ended and done == end - start:
-            return SINOWEALTH
-        return "" if ended or self._modbus == self._sinowealth == _DEAD else None
+            self._done = dict.fromkeys(_MAKERS, _DEAD)
+        open_still = False
+        for name in _MAKERS:
+            if (done := self._done[name]) != _DEAD:
+                self._done[name] = done = self._walk(name, data, start, end, done, ended=ended)
+                if ended and done == end - start:
+                    return name
+                open_still = open_still or done != _DEAD
+        return None if open_still and not ended else ""
 
     @staticmethod
-    def _walk(data: bytes, start: int, end: int, done: int, *, ended: bool, sinowealth: bool) -> int:
+    def _walk(maker: str, data: bytes, start: int, end: int, done: int, *, ended: bool) -> int:
+        step = _STEPS.get(maker)
         while 0 <= done < end - start:
             at = start + done
-            step = sinowealth_step(data, at, end, ended=ended) if sinowealth else modbus_step(data, at, end)
-            if step == _MAYBE:
+            stop = step(data, at, end) if step else sinowealth_step(data, at, end, ended=ended)
+            if stop == _MAYBE:
                 return _DEAD if ended else done
-            done = step - start if step >= 0 else _DEAD
+            done = stop - start if stop >= 0 else _DEAD
         return done

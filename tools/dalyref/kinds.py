@@ -45,4 +45,4 @@ class Record:
     dialect: Dialect | None = None
     """Of a frame, and of a bad_checksum (always A5)."""
     foreign: str = ""
-    """What a foreign record is: ``Modbus RTU``, ``Sinowealth`` or ``Bluetooth module``."""
+    """What a foreign record is: ``Modbus RTU``, ``Sinowealth``, ``Pylontech RS485``, ``JBD``, ``Bluetooth module``."""

@@ -341,6 +341,41 @@ def test_not_even_other_modbus(head: str) -> None:
     assert {record.kind for record in split(with_crc(head.replace(" ", "")))} == {JUNK}
 
 
+PYLONTECH = (b"~20024600800800000000FC22\r", b"~250F46900000FD90\r")  # pylon, pace of more-real-frames.jsonl
+JBD = (bytes.fromhex("dda50300fffd77"), bytes.fromhex("dd0300024849ff6d77"))  # jbd-req; 02 + 48 + 49 = 93
+
+
+@pytest.mark.parametrize(("frames", "name"), [(PYLONTECH, "Pylontech RS485"), (JBD, "JBD")])
+def test_other_makers_batteries(frames: tuple[bytes, bytes], name: str) -> None:
+    for frame in frames:
+        assert foreign(frame) == [(FOREIGN, len(frame), name)]
+        assert foreign(REPLY + frame + REQUEST) == [(FRAME, 13, ""), (FOREIGN, len(frame), name), (FRAME, 13, "")]
+        for at in range(len(frame)):  # a wrong bit anywhere
+            wrong = frame[:at] + bytes((frame[at] ^ 1,)) + frame[at + 1 :]
+            if at != 1 or name != "JBD":  # which the sum of JBD does not hold
+                assert FOREIGN not in {record.kind for record in split(wrong)}
+            assert FOREIGN not in {record.kind for record in split(frame[:at])}
+    both = b"".join(frames)
+    assert foreign(both) == [(FOREIGN, len(both), name)]
+    assert foreign(both + b"\x00") == [(JUNK, len(both) + 1, "")]
+    assert foreign(both + frames[1][:-1]) == [(JUNK, len(both) + len(frames[1]) - 1, "")]
+
+
+def test_two_makers_in_one_gap_are_not_foreign() -> None:
+    assert foreign(JBD[0] + PYLONTECH[0]) == [(JUNK, 33, "")]
+
+
+def test_a_frame_inside_another_makers_is_a_frame() -> None:
+    """7D + 17D + 0D = 207: the sum of the JBD frame around it is right too."""
+    request = bytes.fromhex("a540900800000000000000007d")
+    around = bytes.fromhex("dd03000d") + request + bytes.fromhex("fdf977")
+    assert foreign(around) == [(JUNK, 4, ""), (FRAME, 13, ""), (JUNK, 3, "")]
+
+
+def test_small_letters_are_not_pylontechs() -> None:
+    assert {record.kind for record in split(PYLONTECH[0].lower())} == {JUNK}
+
+
 def test_long_run_is_not_foreign() -> None:
     frame = with_crc("01030000000a")
     assert foreign(frame * 512) == [(FOREIGN, 4096, "Modbus RTU")]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _DIALECTS = {"a5": "A5 (UART/485)", "d2": "Modbus D2", "81": "Modbus 81", "hkms": "HKMS CAN"}
 _REMEMBERED = 1024  # requests
 _INVERTERS = frozenset((can_foreign.VICTRON, can_foreign.PYLONTECH_HV))
-_SINOWEALTH = "Sinowealth"
+_OTHER_BATTERIES = ("Sinowealth", "JBD")
 _MODBUS = "Modbus"
 _ANSWERS_81, _ASKS_81 = range(0x51, 0x61), 0x30
 """50 + N answers what 80 + N was asked (docs/records.md 2)."""
@@ -232,11 +232,12 @@ class Requests(Watch):
                 "an inverter's protocol is on the bus, which the pack sends by itself: in such a mode a board answers "
                 "no polls. Read those frames, or set the board's CAN to Daly's own protocol (250 kbit/s)"
             )
-        if _SINOWEALTH in self._foreign:
-            return (
-                "somebody on this bus talks with a Sinowealth board, which does not know Daly's protocol: if it is "
-                "this pack, use a program for Sinowealth boards"
-            )
+        for maker in _OTHER_BATTERIES:
+            if maker in self._foreign:
+                return (
+                    f"somebody on this bus talks with a {maker} board, which does not know Daly's protocol: if it is "
+                    f"this pack, use a program for {maker} boards"
+                )
         if place.data_id is None and (place.board or 0) > 1:
             return (
                 f"is there a board with the number {place.board}? Board 1 answers 0x40; check its power and wiring too"

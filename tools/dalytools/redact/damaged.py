@@ -71,6 +71,10 @@ def others(record: Record, blanker: Blanker) -> bytes:
         return _foreign_modbus(record.data, blanker)
     if record.foreign == foreign.SINOWEALTH:
         return _sinowealth(record.data, blanker)
+    if record.foreign == foreign.PYLONTECH:
+        return _pylontech(record.data, blanker)
+    if record.foreign == foreign.JBD:
+        return _jbd(record.data, blanker)
     if bluetooth_module.is_text(record.data):
         return _module_text(record.data, blanker)
     return modbus_data.blank(record.data, None, blanker)
@@ -133,3 +137,28 @@ def blank(record: Record, blanker: Blanker) -> bytes:
     if record.kind is Kind.FOREIGN:
         return others(record, blanker)
     return junk(record.data, blanker)
+
+
+def _pylontech(data: bytes, blanker: Blanker) -> bytes:
+    out = b""
+    at = 0
+    while at < len(data):
+        stop = foreign.pylontech_step(data, at, len(data))
+        frame, head = data[at:stop], foreign.PYLONTECH_HEAD
+        content = blanker.given(frame[head:-5], b"0" * len(frame[head:-5]), What.FOREIGN, foreign.PYLONTECH)
+        body = frame[:head] + content
+        out += body + b"%04X\r" % foreign.complement(body[1:])
+        at = stop
+    return out
+
+
+def _jbd(data: bytes, blanker: Blanker) -> bytes:
+    out = b""
+    at = 0
+    while at < len(data):
+        stop = foreign.jbd_step(data, at, len(data))
+        frame, head = data[at:stop], foreign.JBD_HEAD
+        body = frame[:head] + blanker.whole(frame[head:-3], What.FOREIGN, foreign.JBD)
+        out += body + foreign.complement(body[2:]).to_bytes(2) + frame[-1:]
+        at = stop
+    return out

@@ -181,6 +181,14 @@ def test_other_peoples_frames(tmp_path: Path) -> None:
     assert out == [with_crc8(bytes((0x0A, 1, 2, 0, 0))), ask + with_crc(bytes((7, 3, 4, 0, 0, 0, 0)))]
 
 
+def test_other_makers_batteries(tmp_path: Path) -> None:
+    """Pylontech: four digits of a text, "HI!"; JBD: two bytes. Their heads stay, their sums are right again."""
+    out = redacted(
+        tmp_path, [b"~20024600C004" + b"4849" + b"FCC2\r", bytes.fromhex("DD0500024849FF6D77")], apart_ms=1000
+    )
+    assert out == [b"~20024600C004" + b"0000" + b"FCDB\r", bytes.fromhex("DD0500020000FFFE77")]
+
+
 def test_other_link_types_are_blanked_whole(tmp_path: Path) -> None:
     assert redacted(tmp_path, [b"an Ethernet frame"], link_type=1) == [bytes(17)]
 
