@@ -19,10 +19,11 @@ def iso(time_ns: int) -> str | None:
         return None
 
 
-def clock(time_ns: int, zone: tzinfo | None = None) -> str:
-    """Return the time of day; without a zone the local one, as ``dalyshark decode`` shows it."""
+def clock(time_ns: int, zone: tzinfo | None = None, *, day: bool = False) -> str:
+    """Return the time of day, with `day` its date in front; without a zone local, as ``dalyshark decode`` shows it."""
     seconds, nanos = divmod(time_ns, _NANO)
     try:
-        return f"{datetime.fromtimestamp(seconds, zone).astimezone(zone):%H:%M:%S}.{nanos // 1_000_000:03d}"
+        moment = datetime.fromtimestamp(seconds, zone).astimezone(zone)
+        return f"{moment:{'%Y-%m-%d ' if day else ''}%H:%M:%S}.{nanos // 1_000_000:03d}"
     except (OverflowError, OSError, ValueError):
         return "--:--:--.---"

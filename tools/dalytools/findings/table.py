@@ -90,14 +90,19 @@ def show(findings: Sequence[Finding], to: Console) -> None:
         to.print(f"and {more}; --json FILE has all of them", soft_wrap=True)
 
 
-def when(tally: Tally, zone: tzinfo | None = None) -> str:
-    """Say from where to where, a line each: packets, and times of day; without a zone local ones."""
+def when(tally: Tally, zone: tzinfo | None = None, *, day: bool = False) -> str:
+    """Say from where to where, a line each: packets, and times; without a zone local ones.
+
+    day: with their dates, which stand there in any case where one is not the other's.
+    """
     if not tally.first_packet:
         return "whole file"
     packets = f"packet {tally.first_packet}" if tally.count == 1 else f"{tally.first_packet} .. {tally.last_packet}"
     if not tally.first_ns:
         return packets
-    first, last = clock(tally.first_ns, zone), clock(tally.last_ns, zone)
+    first, last = (clock(time_ns, zone, day=True) for time_ns in (tally.first_ns, tally.last_ns))
+    if not day and first.split()[0] == last.split()[0]:
+        first, last = first.split()[-1], last.split()[-1]
     return f"{packets}\n{first}" if tally.count == 1 else f"{packets}\n{first}\n{last}"
 
 

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from dalytools.report.gaps import LONGER, broken, gaps, longest_step
+
 if TYPE_CHECKING:
+    from collections import Counter
     from collections.abc import Iterable
 
     from dalytools.report.collect import BoardSeen, Collected
@@ -20,6 +23,8 @@ Figure = dict[str, Any]
 
 _ROW_PX = 190
 _GAP_PX = 46
+_PIXELS = 500
+_MOST_DOTS = 1000
 _KIND_COLOURS = {
     "frame": "#2a9d8f",
     "bad_checksum": "#d62828",
@@ -189,15 +194,17 @@ def _lines(rows: _Rows, series: dict[str, Series], names: Iterable[str], unit: s
 def _line_of(rows: _Rows, name: str, series: Series, unit: str) -> list[Trace]:
     if not series.count:
         return []
-    times, values = series.points()
+    times, values = broken(*series.points())
+    few = len(values) == 1 or (None in values and len(values) <= _MOST_DOTS)  # of a short piece the line is no pixel
     return [
         {
             "type": "scatter",  # not scattergl: a remote desktop has no WebGL, and shows nothing
-            "mode": "lines" if len(values) > 1 else "markers",
+            "mode": "lines+markers" if few else "lines",
             "name": name,
             "x": rows.times(times),
             "y": values,
             "line": {"width": 1.4},
+            "marker": {"size": 3 if len(values) > 1 else 6},
             "hovertemplate": f"%{{y:.6g}} {unit}",
         }
     ]
@@ -208,14 +215,14 @@ def _steps(rows: _Rows, series: dict[str, Series], names: tuple[str, ...]) -> li
     out: list[Trace] = []
     for level, name in enumerate(names):
         if name in series:
-            times, values = series[name].points()
+            times, values = broken(*series[name].points())
             out.append(
                 {
                     "type": "scatter",
                     "mode": "lines",
                     "name": name,
                     "x": rows.times(times),
-                    "y": [value + 2 * level for value in values],
+                    "y": [None if value is None else value + 2 * level for value in values],
                     "text": ["on" if value else "off" for value in values],
                     "line": {"shape": "hv", "width": 2},
                     "hovertemplate": "%{text}",
@@ -227,15 +234,15 @@ def _steps(rows: _Rows, series: dict[str, Series], names: tuple[str, ...]) -> li
 def _state(rows: _Rows, series: dict[str, Series]) -> list[Trace]:
     if "state" not in series:
         return []
-    times, values = series["state"].points()
+    times, values = broken(*series["state"].points())
     return [
         {
             "type": "scatter",
             "mode": "lines",
             "name": "state",
             "x": rows.times(times),
-            "y": [4 + min(value, 2.4) for value in values],
-            "text": [_STATES.get(int(value), f"state {value:.0f}") for value in values],
+            "y": [None if value is None else 4 + min(value, 2.4) for value in values],
+            "text": ["" if value is None else _STATES.get(int(value), f"state {value:.0f}") for value in values],
             "line": {"shape": "hv", "width": 2},
             "hovertemplate": "%{text}",
         }
@@ -265,10 +272,15 @@ def _faults(rows: _Rows, board: BoardSeen, end: float) -> list[Trace]:
 
 
 def _balancing(rows: _Rows, board: BoardSeen) -> list[Trace]:
-    columns = board.balancing.columns()
-    cells = sorted({int(name) for _, column in columns for name in column if name != "replies"})
+    columns: list[tuple[float, Counter[str] | None]] = [*board.balancing.columns()]
+    cells = sorted({int(name) for _, column in columns for name in column or () if name != "replies"})
     if not cells:
         return []
+    begins = [begin for begin, _ in columns]
+    usual = max(board.balancing.length, longest_step(begins) / LONGER, (begins[-1] - begins[0]) / _PIXELS)
+    for place in reversed(gaps(begins)):  # what is next to nothing must not be drawn as wide as that
+        width = min(usual, (begins[place + 1] - begins[place]) / 3)
+        columns[place + 1 : place + 1] = [(begins[place] + width, None), (begins[place + 1] - width, None)]
     numbers = list(range(1, max(cells) + 1))
     return [
         {
@@ -277,7 +289,9 @@ def _balancing(rows: _Rows, board: BoardSeen) -> list[Trace]:
             "showlegend": False,
             "x": rows.times(begin + board.balancing.length / 2 for begin, _ in columns),
             "y": numbers,
-            "z": [[column[str(cell)] / max(1, column["replies"]) for _, column in columns] for cell in numbers],
+            "z": [
+                [column and column[str(cell)] / max(1, column["replies"]) for _, column in columns] for cell in numbers
+            ],
             "zmin": 0,
             "zmax": 1,
             "colorscale": [[0, "rgba(42,157,143,0)"], [1, "rgb(42,157,143)"]],

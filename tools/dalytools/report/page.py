@@ -154,7 +154,7 @@ def _found(found: Sequence[tuple[str, Finding]]) -> str:
     advised: set[tuple[str, str]] = set()
     for file, finding in found:
         where = f"{file}: {finding.place}" if file else str(finding.place)
-        moment = when(finding.tally, UTC).replace("\n", ", ", 1).replace("\n", " to ")
+        moment = when(finding.tally, UTC, day=True).replace("\n", ", ", 1).replace("\n", " to ")
         moment += " UTC" if finding.tally.first_ns else ""
         faint = [*finding.examples, f"packets {moment}" if moment[0].isdigit() else moment]
         if (finding.rule, finding.advice) not in advised:  # once is enough for people

@@ -126,7 +126,8 @@ def test_what_was_found_has_its_time_and_says_what_to_do_once(faults: Path) -> N
     assert text.count(">fault-raised<") > 1
     assert text.count("see what the battery did at that time") == 1
     assert re.search(
-        r"made-faults.pcapng: board 1, \w+: raised 1 time.*?<div class=\"faint\">packet \d+, \d\d:\d\d:", text
+        r"made-faults.pcapng: board 1, \w+: raised 1 time.*?<div class=\"faint\">packet \d+, 2026-01-01 \d\d:\d\d:",
+        text,
     )
 
 
@@ -140,7 +141,7 @@ def test_times_are_those_of_the_plots_wherever_the_reader_is(tmp_path: Path, mon
     finally:
         monkeypatch.undo()
         time.tzset()
-    assert ">packet 12, 00:00:00.689 UTC<" in page.read_text("utf-8")
+    assert ">packet 12, 2026-01-01 00:00:00.689 UTC<" in page.read_text("utf-8")
 
 
 def test_a_capture_of_tcp_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -206,3 +207,20 @@ def test_captures_of_one_time_are_said(tmp_path: Path, capsys: pytest.CaptureFix
 def test_to_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(SAMPLES / "made-faults.pcapng"), "-o", "-"]) == 0
     assert capsys.readouterr().out.startswith("<!DOCTYPE html>")
+
+
+def test_nothing_is_drawn_over_a_night_without_a_word(tmp_path: Path) -> None:
+    """Two times twenty seconds, twelve hours apart: cell 2 balances in the first only."""
+    frames: list[tuple[float, bytes]] = []
+    for start, mask in ((0, "02"), (43_200, "00")):
+        for second in range(start, start + 20):
+            frames += [(second, a5(1, 0x90, bytes.fromhex("02100000753001f4")))]
+            frames += [(second + 0.5, a5(1, 0x97, bytes.fromhex(mask + "00" * 7)))]
+    page = tmp_path / "page.html"
+    assert main(["report", str(write(tmp_path / "in.pcapng", frames)), "-o", str(page)]) == 0
+    (volts,) = traces(page, "voltage")
+    assert volts["y"] == [52.8] * 20 + [None] + [52.8] * 20
+    (map_,) = traces(page, "balancing")
+    first, second = (row for row in map_["z"])
+    assert (first, second) == ([0] * 20 + [None] * 2 + [0] * 20, [1] * 20 + [None] * 2 + [0] * 20)
+    assert map_["x"][20] - map_["x"][19] == map_["x"][22] - map_["x"][21] == pytest.approx(43_219 * 2)  # a pixel
