@@ -214,12 +214,9 @@ class Decoder:
         while held:
             decoded, slate = held[0]
             if slate is not None and (late_ns := slate.waits_until()):
-                if not (
-                    everything
-                    or slate.bus.now_ns > late_ns + _LATE_ON_BUS_NS
-                    or self._now_ns > late_ns + LATE_NS
-                    or len(held) > MOST_HELD
-                ):
+                over = slate.bus.now_ns > late_ns + _LATE_ON_BUS_NS or self._now_ns > late_ns + LATE_NS
+                # Bytes of a long packet may lie behind the beginning of the newest, which decides what is unanswered.
+                if not (everything or (over and self._latest_ns > late_ns) or len(held) > MOST_HELD):
                     break
                 slate.bus.settle(slate, self._latest_ns)
             out.append(decoded)

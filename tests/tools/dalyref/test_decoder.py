@@ -136,6 +136,15 @@ def test_unanswered_request_comes_when_its_second_is_over() -> None:
     assert [record.number for record in out] == [1, 2, 3]
 
 
+def test_what_a_long_packet_holds_is_unanswered_once_the_next_packet_has_begun() -> None:
+    """A request, and four seconds of other replies in the same packet: it is packets that tell (docs/records.md, 7)."""
+    packet = Packet(1, at(0), frame(0x40, 0x91) + ANSWER * 300)
+    first, *_ = decode([packet, Packet(2, at(4100), ANSWER)])
+    assert first.fields["daly.unanswered"] is True
+    alone, *_ = decode([packet])
+    assert "daly.unanswered" not in alone.fields
+
+
 def test_early_records_are_the_same_in_the_same_order() -> None:
     """A screen has each at once; what is added to it later shows there too."""
     early: list[Decoded] = []
