@@ -87,7 +87,7 @@ class Values(Watch):
                 self._soc_set[bus] = record.time_ns
             if "daly.unanswered" in fields:
                 place = _board(record, bus)
-                self._cleared(place, self._runs[place].unanswered(fields.get("daly.data_id")))
+                self._cleared(place, self._runs[place].unanswered(fields.get("daly.data_id"), record.time_ns))
         if fields.get("daly.direction") != REPLY:
             return
         self._contradiction(record, bus, fields)

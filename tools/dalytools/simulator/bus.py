@@ -228,7 +228,7 @@ class Bus:
             if late is not None:
                 due = self.now_ns + delay_ns + int(late.delay_ms * 1e6)
                 faults = board.battery.reading.faults
-                begins = partial(self._notes.late, number, request, due - int(late.delay_ms * 1e6), done)
+                begins = partial(self._notes.late, number, request, due - int(late.delay_ms * 1e6), done, zero=zero > 0)
                 said = partial(self._notes.said, number, request, frames, lies, None if zero else faults)
                 self._stations.append(LateReply(due, name, frames, begins, said))
                 why = "late"

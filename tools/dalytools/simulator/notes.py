@@ -54,9 +54,11 @@ class Notes:
             facts = {"dialect": dialect, "register": int.from_bytes(request[2:4]), "value": request[4:-2].hex()}
         self._truth.note(at_ns, "write", host=sender, **facts, result=result if reply else "none")
 
-    def late(self, number: int, request: bytes, meant_ns: int, tampered: list[Tampered]) -> None:
-        """Note an answer that begins late. meant_ns: when it would have begun."""
+    def late(self, number: int, request: bytes, meant_ns: int, tampered: list[Tampered], *, zero: bool) -> None:
+        """Note an answer that begins late. meant_ns: when it would have begun; zero: it is one of waking up."""
         self._truth.note(self._now(), "late", board=number, delay_s=(self._now() - meant_ns) / 1e9, **about(request))
+        if zero:
+            self._truth.note(self._now(), "zero_reply", board=number, **about(request))
         self.tampered(number, request, tampered)
 
     def tampered(self, number: int, request: bytes, tampered: list[Tampered]) -> None:

@@ -16,6 +16,7 @@ from tests.tools.dalytools.findings.visible import (
     LONGEST_S,
     RECENT_S,
     WAITS_S,
+    comes_late,
     exception_fits,
     same_request,
     there_at,
@@ -44,7 +45,9 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
         return True
     if moment.rule == "echo":
         return _repeats_a_collision(moment, heard, notes) or any(
-            note["what"] == "unanswered" and note.get("why") == "busy" and same_request(note, seconds, heard)
+            note["what"] == "unanswered"
+            and note.get("why") in {"busy", "damaged"}
+            and same_request(note, seconds, heard)
             for note in during(notes, seconds - ECHOES_S, seconds + 1e-3)
         )
     if moment.rule == "modbus-ambiguous":
@@ -53,7 +56,11 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
             for note in during(notes, seconds - WAITS_S, seconds)
         )
     if moment.rule in {"unanswered", "silent", "asleep"} and (
-        _harmed(moment, heard, notes)
+        any(
+            note["what"] == "echo" and comes_late(note, heard, notes)
+            for note in during(notes, seconds - 1e-3, seconds + 1e-3)
+        )
+        or _harmed(moment, heard, notes)
         or _other_fits(moment, heard, notes)
         or _newer_is_answered(moment, heard, notes)
         or _second_answer(moment, heard, notes)

@@ -660,6 +660,20 @@ def test_zeros_behind_an_answer_are_right_if_a_pause_follows(pause: float, of_wa
     assert zeros.tally.count == of_waking
 
 
+def test_asking_what_a_board_never_answers_is_no_pause(tmp_path: Path) -> None:
+    """The end of a poll again, with three tries for 0x97 in between; the zeros behind them are true all the same."""
+    packets = [
+        *asked(0, 0x90, PACK),
+        *(Heard(at, a5(0x40, 0x97)) for at in (0.4, 1.2, 2.0)),
+        *asked(2.8, 0x98, FINE),
+        *asked(10.8, 0x98, FINE),
+        *asked(11.2, 0x90, a5(1, 0x90)),
+        *asked(15, 0x90, PACK),
+    ]
+    zeros = one(search(capture(tmp_path / "turn.pcapng", [*packets, *LATER])), "zero-reply")
+    assert zeros.tally.count == 2
+
+
 def test_zeros_of_waking_up_may_have_a_pause_between_them(tmp_path: Path) -> None:
     """It woke just before the end of its turn."""
     packets = [

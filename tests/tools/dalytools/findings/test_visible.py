@@ -183,6 +183,14 @@ def test_a_foreign_device_right_behind_damage_may_end_a_frame_by_accident() -> N
     assert not hidden(note, [accident, rest], [note])
 
 
+def test_an_echo_behind_another_boards_answer_is_a_request() -> None:
+    note = {"what": "echo", "time": 5.12, "address": 0x4B, "data_id": 0x96}
+    asked, other, echo = heard(5.0, 0x4B, 0x96), heard(5.1, 1, 0x96), heard(5.12, 0x4B, 0x96)
+    assert hidden(note, [asked, other, echo], [note])
+    assert not hidden({**note, "time": 5.1}, [asked, echo._replace(seconds=5.1)], [note])
+    assert not hidden(note, [echo], [note])
+
+
 def test_a_burst_of_which_nothing_came_shows_no_hole() -> None:
     note = {"what": "skipped_frame", "time": 5.0, "board": 16, "data_id": 0x95, "frame": 1}
     damaged = {"what": "damaged", "time": 5.09, "sender": "board 16"}

@@ -65,6 +65,8 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("skipped_frame", _nothing_came, "what came of it was damaged"),
         ("late", _nothing_came, "what came of it was damaged"),
         ("other_board", _nothing_came, "what came of it was damaged"),
+        ("zero_reply", _nothing_came, "what came of it was damaged"),
+        ("echo", comes_late, "later than 100 ms: a request again (records.md 6)"),
         ("zero_reply", _may_be_zero, "registers that may all be zero"),
         ("late", _taken_before, "another reply was taken for it: a request is given one late reply (records.md 7)"),
         *(
@@ -112,6 +114,13 @@ def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
     near = between(heard, seconds - ECHOES_S, seconds + 1e-6)
     same = [frame for frame in near if (frame.address, frame.data_id) == (note["address"], note.get("data_id"))]
     return len(same) > 1 and same[0].size == A5_SIZE
+
+
+def comes_late(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether an echo begins more than 100 ms behind the end of its request, as when another board spoke first."""
+    near = between(heard, at(note) - WAITS_S, at(note) + 1e-6)
+    same = [frame for frame in near if (frame.address, frame.data_id) == (note["address"], note.get("data_id"))]
+    return len(same) > 1 and same[-1].seconds - same[-2].seconds > ECHOES_S
 
 
 def _swallowed(note: Note, heard: list[Frame], notes: list[Note]) -> bool:

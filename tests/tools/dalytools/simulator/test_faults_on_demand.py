@@ -246,6 +246,17 @@ def test_faults_are_told_by_a_good_reply_behind_noise() -> None:
     assert 0 < whole < 60
 
 
+def test_a_late_reply_may_be_one_of_waking_up() -> None:
+    events = (
+        Event(5, "sleep", 1, name="silence"),
+        Event(7, "wake", 1),
+        Event(7, "late", 1, data_id=0x90, delay_ms=900),
+    )
+    _, notes = run(replace(read_scenario("late-replies"), events=events), 12)
+    (late,) = of(notes, "late")
+    assert late["time"] in [note["time"] for note in of(notes, "zero_reply") if note["data_id"] == 0x90]
+
+
 def test_an_echo_does_not_come_late() -> None:
     made = read_scenario("late-replies")
     events = (Event(5, "sleep", 1, name="echo"), Event(5, "late", 1, delay_ms=900))
