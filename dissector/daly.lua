@@ -130,21 +130,25 @@ end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like
 local CHOSEN = 0 -- pinfo.match_uint where the user chose us (Decode As)
+local LOWEST = can.LOWEST
+local show_can, show_serial = can.dissect, serial.dissect
 
 local ports_of, brought_by = getters.attribute("Pinfo", "port_type"), getters.attribute("Pinfo", "match_uint")
 local handle
 
 function daly.dissector(buffer, pinfo, parent)
   handle = handle or Dissector.get("daly")
+  local key = brought_by(pinfo)
+  if key > LAST_PORT then -- an extended identifier of CAN: nothing else that brings us packets is so high
+    return show_can(buffer, pinfo, parent, handle, key)
+  end
   local ports = ports_of(pinfo)
   if ports ~= NO_PORTS then
     return (ports == ble.PORT_TYPE and ble or tcp).dissect(buffer, pinfo, parent, handle)
+  elseif key >= LOWEST or key == CHOSEN and can.brought(buffer, key) then
+    return show_can(buffer, pinfo, parent, handle, key)
   end
-  local key = brought_by(pinfo)
-  if (key >= can.LOWEST or key == CHOSEN) and can.brought(buffer, key) then
-    return can.dissect(buffer, pinfo, parent, handle, key)
-  end
-  return serial.dissect(buffer, pinfo, parent, handle, key)
+  return show_serial(buffer, pinfo, parent, handle, key)
 end
 
 -- Doors -------------------------------------------------------------------------------------------

@@ -246,12 +246,12 @@ function M.dissect(buffer, pinfo, parent, handle)
   local number, again = at_hand.number, at_hand.again
   local capture = at_hand.state.capture
   local raw = buffer:raw()
-  view.look(parent, handle, capture.results, again, "ble")
   local items = streams.plan(capture, number, again)
   if items then
+    view.look(parent, handle, capture.results, again, "ble")
     view.several(parent, buffer, raw, items, pinfo)
   else
-    view.whole(parent, buffer, raw, number, pinfo)
+    view.whole(parent, handle, capture.results, again, "ble", buffer, raw, number, pinfo)
   end
   return #raw
 end

@@ -31,7 +31,7 @@ local extract = getters.operator("Field", "__call", function(field)
 end)
 local out, look, shortly = view.out, view.look, view.shortly
 local raw_of, told = classic.raw, classic.told
-local read, shape_of = can_bus.read, ids.shape
+local read, shape_of, shapes = can_bus.read, ids.shape, ids.shapes
 
 -- State of the capture that is open.
 local options
@@ -122,11 +122,17 @@ local function show_foreign(_, thing, wanted)
   return "Not Daly: " .. thing.name
 end
 
--- Show a classic frame in full, after view.look. `raw`: in the form of an A5 frame. Returns how many bytes were taken.
-local function show_classic(slot, shape, raw, length, remote, buffer, pinfo, parent)
-  frame.shape, frame.slot, frame.remote, frame.raw = shape, slot, remote, raw
-  view.one(parent, buffer, length, "frame", raw, slot, pinfo, classic.show, frame, told)
-  return length > 0 and length or 1 -- 0 would say that it is not ours
+-- What a frame said when it came before (daly_view.told), or nil.
+local function told_of(id, data)
+  local all = told.entries[id]
+  return all and all[data]
+end
+
+-- Show a classic frame in full, after view.look. `raw`: in the form of an A5 frame.
+local function show_classic(slot, shape, raw, data, remote, buffer, pinfo, parent)
+  local id = shape.id
+  frame.shape, frame.slot, frame.remote, frame.raw, frame.told = shape, slot, remote, raw, told_of(id, data)
+  view.one(parent, buffer, #data, "frame", raw, slot, pinfo, classic.show, frame, told, id, data)
 end
 
 -- Show what was found out of a frame, if it is ours. Returns how many bytes were taken.
@@ -137,7 +143,8 @@ local function show(from, slot, shape, data, remote, buffer, pinfo, parent, hand
   end
   look(parent, handle, from.results, again, "can")
   if not found then
-    return show_classic(slot, shape, raw_of(shape, data), length, remote, buffer, pinfo, parent)
+    show_classic(slot, shape, raw_of(shape, data), data, remote, buffer, pinfo, parent)
+    return length > 0 and length or 1 -- 0 would say that it is not ours
   end
   frame.shape, frame.slot, frame.remote, frame.length = shape, slot, remote, length
   if found == can_bus.HKMS then
@@ -157,7 +164,7 @@ M.LOWEST = LOWEST
 --- Whether what brought us a packet is CAN, by pinfo.match_uint: an identifier; or the user's choice, which can be of
 -- RTAC serial too.
 function M.brought(buffer, key)
-  return key >= LOWEST or key == CHOSEN and buffer:offset() ~= RTAC_HEADER
+  return key >= LOWEST or key == CHOSEN and place_of(buffer) ~= RTAC_HEADER
 end
 
 local function refuse(number, id)
@@ -236,7 +243,7 @@ function M.dissect(buffer, pinfo, parent, handle, id)
   if length ~= 8 and (length > 8 or length ~= length_of(buffer)) then
     return 0
   end
-  local shape = shape_of(id)
+  local shape = shapes[id] or shape_of(id)
   -- Every frame but those of CAN FD has this flag, where there is a tree.
   local flag = extract(is_remote)
   local remote = flag and value_of(flag)
@@ -244,16 +251,17 @@ function M.dissect(buffer, pinfo, parent, handle, id)
     local interface = not no_interfaces and extract(interface_id)
     no_interfaces = not interface
     local key = interface and value_of(interface) or NO_INTERFACE
-    local raw = read(state, key, slot, number, shape, data, time_of(pinfo))
+    local entry = told_of(id, data)
+    local raw = read(state, key, slot, number, shape, data, time_of(pinfo), entry and entry[6])
     if not all_registered and state.known then
       register_all()
     end
     if raw then
-      look(parent, handle, state.results, false, "can")
-      if shortly(parent, raw, slot, pinfo, told) then
-        return length > 0 and length or 1
+      if not (entry and shortly(parent, handle, state.results, entry, slot, pinfo)) then
+        look(parent, handle, state.results, false, "can")
+        show_classic(slot, shape, raw, data, false, buffer, pinfo, parent)
       end
-      return show_classic(slot, shape, raw, length, false, buffer, pinfo, parent)
+      return length > 0 and length or 1
     end
     local taken = show(state, slot, shape, data, false, buffer, pinfo, parent, handle, false)
     return taken > 0 and taken or refuse(number, id)

@@ -68,7 +68,6 @@ local function kind_of(bus, shape, data)
   if shape.writes and (bus.alive or shape.register == ids.SET_SOC and bus.classic) then
     return "hkms"
   elseif shape.classic and (shape.sure or bus.classic) then
-    bus.classic = bus.classic or shape.sure
     return "classic"
   elseif shape.keep_alive then
     if data == NOTHING then
@@ -85,26 +84,25 @@ local function kind_of(bus, shape, data)
 end
 
 --- One frame, in the order of the capture, once: its `shape` (daly_can_ids), `data` (at most eight bytes), `time` in s.
--- Returns a classic frame in the form of an A5 frame.
-function M.read(state, key, slot, number, shape, data, time)
-  local results = state.results
+-- Returns a classic frame in the form of an A5 frame (`raw`, where that is at hand).
+function M.read(state, key, slot, number, shape, data, time, raw)
   local bus = state.buses[key] or bus_of(state, key)
   local kind
-  if shape.sure then
-    kind, bus.classic = "classic", true
-  else
+  if not shape.sure then
     kind = kind_of(bus, shape, data)
-  end
-  if not kind then
-    return nil
+    if not kind then
+      return nil
+    end
   end
   state.known = true
+  local results = state.results
   if time > results.latest then
     results.latest = time
   end
-  if kind == "classic" then
-    local raw = raw_of(shape, data)
-    feed(bus.daly, slot, number, raw, time, time, nil, bus)
+  if not kind or kind == "classic" then
+    bus.classic = true
+    raw = raw or raw_of(shape, data)
+    feed(bus.daly, slot, number, raw, time, time)
     return raw
   elseif kind == "hkms" then
     state.found[slot] = M.HKMS

@@ -73,10 +73,10 @@ local function names(raw)
   return beginnings[id], sources[id], destinations[id]
 end
 
---- What classic frames said (daly_view.shortly).
+--- What classic frames said (daly_view.shortly): by identifier and bytes.
 M.told = view.told()
 
-local carrier = { names = names, told = M.told }
+local carrier = { names = names }
 
 function carrier.board()
   return shape.board
@@ -88,9 +88,9 @@ function carrier.show(raw)
   M.show_head(shape, byte(raw, 4), remote)
 end
 
---- For daly_view.one. `frame`: { raw = as_a5, shape =, slot =, remote = }.
+--- For daly_view.one. `frame`: { raw = as_a5, shape =, slot =, remote =, told = what it told when it came before }.
 function M.show(item, frame)
-  shape, remote = frame.shape, frame.remote
+  shape, remote, carrier.told = frame.shape, frame.remote, frame.told
   return view.a5_on(item, frame.raw, frame.slot, carrier)
 end
 

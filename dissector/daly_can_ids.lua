@@ -87,6 +87,9 @@ end
 local MOST_SHAPES = 4096
 local shapes, count = {}, 0
 
+--- Those that were asked for, by identifier (M.shape).
+M.shapes = shapes
+
 --- What an identifier can be: { id =, priority =, destination =, source =, register =, board = the one that is asked or
 -- speaks, asks = whether a host asks a board, classic = data ID, sure = whether that ID tells Daly from others, writes
 -- =, streamed =, keep_alive = of HKMS, foreign = name }, each nil or false where it is not.
@@ -94,7 +97,10 @@ function M.shape(id)
   local found = shapes[id]
   if not found then
     if count >= MOST_SHAPES then
-      shapes, count = {}, 0
+      for known in pairs(shapes) do
+        shapes[known] = nil
+      end
+      count = 0
     end
     found = shape(id)
     shapes[id], count = found, count + 1

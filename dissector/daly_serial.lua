@@ -16,7 +16,7 @@ local windows = require("daly_windows")
 local M = {}
 
 local bytes_of = Tvb.raw
-local read_first = streams.first
+local read_first, show_whole = streams.first, view.whole
 local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
 local time_of, side_of = getters.attribute("Pinfo", "rel_ts"), getters.attribute("Pinfo", "p2p_dir")
 local value_of = getters.attribute("FieldInfo", "value")
@@ -202,8 +202,7 @@ function M.dissect(buffer, pinfo, parent, handle, key)
   end
 
   if whole then
-    view.look(parent, handle, from.results, again)
-    view.whole(parent, buffer, raw, number, pinfo)
+    show_whole(parent, handle, from.results, again, "uart", buffer, raw, number, pinfo)
     return length
   end
 
@@ -219,7 +218,7 @@ function M.dissect(buffer, pinfo, parent, handle, key)
     end
     -- Without a tree nobody knows yet whose it is: so that Wireshark's Modbus reads it once, in order (daly_mbrtu).
   end
-  view.look(parent, handle, from.results, again)
+  view.look(parent, handle, from.results, again, "uart")
   view.several(parent, buffer, raw, items, pinfo)
   return length
 end

@@ -63,12 +63,14 @@ function M.init(options)
 end
 
 --- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
--- capture was read to its end; `medium`: uart where it is nil.
-function M.look(parent, handle, known, read, medium)
+-- capture was read to its end; `medium`: uart, can, ble, tcp.
+local function look(parent, handle, known, read, medium)
   wanted = referenced(parent, handle)
   visible = wanted and is_visible(parent)
-  results, again, transport = known, read, medium or "uart"
+  results, again, transport = known, read, medium
 end
+
+M.look = look
 
 -- Tree --------------------------------------------------------------------------------------------
 
@@ -265,8 +267,8 @@ end
 local frame = {} -- the one at hand, for daly_payload
 
 -- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and
--- destination, board = function(raw), show = function(raw): fields of its head, told = M.told(), or nil where the words
--- say more than the bytes }. nil: an A5 frame.
+-- destination, board = function(raw), show = function(raw): fields of its head, told = what it told when it came before
+-- (an entry of M.told), or nil }. nil: an A5 frame.
 local carrier
 
 -- What a frame's rare things say (daly_results' odd): expert notes.
@@ -351,16 +353,18 @@ local own_told = M.told()
 
 -- The words of a reply that was told before with the same memory, or nil.
 local function told_before(raw, memory)
-  local told = own_told
+  local entry
   if carrier then
-    told = carrier.told
+    entry = carrier.told
+  else
+    entry = own_told.entries[raw]
   end
-  local entry = told and told.entries[raw]
   return entry and entry[1] == (memory or false) and entry[2] or nil
 end
 
--- Remember what a frame said, where bytes and memory make it say the same again.
-local function keep_told(told, raw, slot, text, source, destination)
+-- Remember what a frame said, where bytes and memory make it say the same again; by `key`, in the entries of `group`
+-- where there is one.
+local function keep_told(told, group, key, raw, slot, text, source, destination)
   if again or results.odd[slot] or results.flag[slot] then
     return
   end
@@ -371,7 +375,12 @@ local function keep_told(told, raw, slot, text, source, destination)
   if told.count >= MOST_TOLD then
     told.entries, told.count = {}, 0
   end
-  told.entries[raw] = { memory, text, source, destination, noted and -math.huge or slow }
+  local entries = told.entries
+  if group then
+    entries[group] = entries[group] or {}
+    entries = entries[group]
+  end
+  entries[key] = { memory, text, source, destination, noted and -math.huge or slow, raw }
   told.count = told.count + 1
 end
 
@@ -691,19 +700,23 @@ function M.several(parent, buffer, raw, items, pinfo)
   end
 end
 
---- Show a whole frame as it was shown before, where nobody looks closer. Returns whether that was enough; else it is to
--- be shown in full, which remembers it. `told`: the memory of its carrier.
-function M.shortly(parent, raw, slot, pinfo, told)
-  local entry = told.entries[raw]
-  if not entry or wanted or again or M.tap then
-    return false
+--- Show a whole frame, which was read right before, as it was shown when it came before (M.told), where nobody looks
+-- closer. Returns whether that was enough; else it is to be shown in full. `known`: results of its bus.
+local function shortly(parent, handle, known, entry, slot, pinfo)
+  local memory, wait = false, 0
+  if slot == known.newest then
+    memory = known.newest_memory or false
+    wait = known.newest_wait or 0
+  elseif known.entries[slot] ~= 0 then
+    return false -- it is no request either
   end
-  local known = results
   if
-    known.odd[slot]
+    entry[1] ~= memory
+    or wait > entry[5]
+    or known.odd[slot]
     or known.flag[slot]
-    or entry[1] ~= (memory_of(known, slot) or false)
-    or (wait_of(known, slot) or 0) > entry[5]
+    or M.tap
+    or referenced(parent, handle)
   then
     return false
   end
@@ -716,16 +729,18 @@ function M.shortly(parent, raw, slot, pinfo, told)
   return true
 end
 
+M.shortly = shortly
+
 --- A packet that is one record of `kind`, whose `length` bytes stand at the buffer's beginning. `show(item, thing,
 -- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source,
--- destination; `raw` and `slot`: for daly_stat; `told`: memory for M.shortly, or nil.
-function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing, told)
+-- destination; `raw` and `slot`: for daly_stat; `told`: memory for M.shortly, or nil; `group`, `key`: its place there.
+function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing, told, group, key)
   local node = begin(parent, buffer, 0, length, kind)
   at, noted = -4, false
   frame.table = nil
   local text, source, destination = show(node, thing, wanted)
   if told then
-    keep_told(told, raw, slot, text, source, destination)
+    keep_told(told, group, key, raw, slot, text, source, destination)
   end
   set_columns(pinfo, text, source, destination)
   if visible then
@@ -746,11 +761,13 @@ end
 
 M.out, M.hex_words, M.id_words, M.host_name, M.reply_words = out, hex_words, id_words, host_name, reply_words
 
---- A packet that is one whole frame, which is the usual one.
-function M.whole(parent, buffer, raw, slot, pinfo)
-  if M.shortly(parent, raw, slot, pinfo, own_told) then
+--- A packet that is one whole frame, which is the usual one. `handle`, `known`, `read`, `medium`: as for M.look.
+function M.whole(parent, handle, known, read, medium, buffer, raw, slot, pinfo)
+  local entry = not read and own_told.entries[raw]
+  if entry and shortly(parent, handle, known, entry, slot, pinfo) then
     return
   end
+  look(parent, handle, known, read, medium)
   local node = begin(parent, buffer, 0, #raw, "frame")
   frame.table, noted = nil, false
   local text, source, destination
@@ -759,7 +776,7 @@ function M.whole(parent, buffer, raw, slot, pinfo)
   else
     text, source, destination = modbus(node, raw, slot)
   end
-  keep_told(own_told, raw, slot, text, source, destination)
+  keep_told(own_told, nil, raw, raw, slot, text, source, destination)
   set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
