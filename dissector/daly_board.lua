@@ -281,7 +281,10 @@ end
 --- A reply that is one frame. Returns what it is shown with (daly_results), or nil.
 function M.feed(bus, slot, packet, raw, address, id, starts, ends)
   local known = take[id]
-  return known and known(bus, board_of(bus.state, address), slot, packet, raw, starts, ends)
+  if not known then
+    return nil
+  end
+  return known(bus, bus.state.boards[address] or board_of(bus.state, address), slot, packet, raw, starts, ends)
 end
 
 --- A table of all cells (mV) or sensors (raw) of a board with a known count is complete in this packet.

@@ -114,9 +114,13 @@ end
 
 --- The running burst of a bus is over.
 function M.finish(bus)
-  local burst = bus.state.burst
+  local state = bus.state
+  local burst = state.burst
   if burst then
-    bus.state.burst = nil
+    state.burst = nil
+    if burst.count then
+      state.old_burst = burst
+    end
     if M.falls_short(burst) then
       local odd = bus.results.odd[burst.last]
       local with = { cut_off = true }
@@ -131,10 +135,38 @@ end
 -- The table stands in packet `number`: tell the frames before.
 local function link_parts(bus, burst, number)
   burst.table_in = number
-  for i = 1, #burst.parts do
+  for i = 1, burst.part_count do
     note_table(bus, burst.parts[i], number)
   end
-  burst.parts = {}
+  burst.part_count = 0
+end
+
+-- A burst begins. One whose count is known uses the tables of such a one before, which nobody else has.
+local function begin(state, id, address, base, request)
+  local board = state.boards[address]
+  local count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil
+  local per_frame = PER_FRAME[id]
+  local burst = count and state.old_burst
+  if burst then
+    state.old_burst = nil
+  else
+    burst = {
+      pieces = count and {} or nil, -- where the count is known: data bytes of its frames
+      values = per_frame and not count and {} or nil, -- where it is not: by cell or sensor
+      texts = not per_frame and {} or nil, -- by frame number
+      parts = {}, -- slots of its frames, until the table is there
+    }
+  end
+  burst.id = id
+  burst.address = address
+  burst.base = base
+  burst.request = request
+  burst.count = count
+  burst.per_frame = per_frame
+  burst.whole = true -- every frame from the base on was seen
+  burst.part_count = 0
+  burst.table_in = nil
+  return burst
 end
 
 --- A reply that is one of several frames. `damaged`: what stands right before it in its stream is. Returns, each nil
@@ -173,26 +205,9 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
     M.finish(bus)
     local request
     request, wait = exchange.answer(bus, slot, packet, raw, address, id, starts)
-    local board = state.boards[address]
-    local per_frame = PER_FRAME[id]
-    burst = {
-      id = id,
-      address = address,
-      base = base,
-      request = request,
-      count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil,
-      per_frame = per_frame,
-      pieces = nil, -- where the count is known: data bytes of its frames
-      values = nil, -- where it is not: by cell or sensor
-      texts = not per_frame and {} or nil, -- by frame number
-      whole = true, -- every frame from the base on was seen
-      parts = {}, -- slots of its frames, until the table is there
-      table_in = nil,
-    }
-    burst.pieces = burst.count and {} or nil
-    burst.values = per_frame and not burst.count and {} or nil
+    burst = begin(state, id, address, base, request)
     state.burst = burst
-    from = burst.base
+    from = base
   end
   if number > from then
     missing = {}
@@ -201,7 +216,11 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
     end
     burst.whole = false
   end
-  burst.number, burst.ended, burst.asked, burst.last, burst.last_in = number, ends, nil, slot, packet
+  burst.number = number
+  burst.ended = ends
+  burst.asked = nil
+  burst.last = slot
+  burst.last_in = packet
   local packed, list
   if burst.pieces then
     packed = note_piece(burst, raw, number)
@@ -221,7 +240,9 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   elseif list then
     link_parts(bus, burst, packet)
   elseif burst.count then
-    burst.parts[#burst.parts + 1] = slot
+    local count = burst.part_count + 1
+    burst.parts[count] = slot
+    burst.part_count = count
   end
   return burst.request, wait, memory, list, table_in
 end

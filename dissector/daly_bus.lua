@@ -39,6 +39,7 @@ function M.new(times, results)
   local state = exchange.state()
   state.boards = {} -- by address byte of replies
   state.burst = nil -- the running one
+  state.old_burst = nil -- one that is over, whose table serves again
   state.from_zero = {} -- by data ID x 256 + address byte: a reply had number 0
   local bus = { times = times, results = results, state = state, mark = nil }
   results.buses[#results.buses + 1] = bus

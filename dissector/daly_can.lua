@@ -212,10 +212,10 @@ end
 function M.dissect(buffer, pinfo, parent, handle, id)
   local number, place = number_of(pinfo), place_of(buffer)
   usual = usual or place
-  local slot, first
+  local slot, first = number, false
   if place == usual then
-    slot, first = number, number > read_to
-    if first then
+    if number > read_to then
+      first = true
       read_to = number
     end
   else

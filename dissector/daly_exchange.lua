@@ -51,15 +51,9 @@ local function forget_old(state, now, limit)
   state.last, state.remembered = kept, count
 end
 
---- Put a request to those that can be answered (`id`: what they are listed by), and let go of those that can't.
-function M.remember(state, id, request, late)
-  local list = state.asked[id]
-  if not list then
-    list = { first = 1, last = 0 }
-    state.asked[id] = list
-  end
-  local first, last = list.first, list.last + 1
-  list[last] = request
+-- Of several requests in a list, let go of those that can't be answered any more.
+local function let_go(state, list, late)
+  local first, last = list.first, list.last
   while first < last do
     local oldest = list[first]
     if not oldest.answered and state.latest - oldest.ended <= late + GRACE and last - first < MOST_ASKED then
@@ -68,15 +62,42 @@ function M.remember(state, id, request, late)
     list[first] = nil
     first = first + 1
   end
-  list.first, list.last = first, last
+  list.first = first
 end
+
+--- Put a request to those that can be answered (`id`: what they are listed by), and let go of those that can't.
+function M.remember(state, id, request, late)
+  local list = state.asked[id]
+  if not list then
+    list = { first = 1, last = 0 }
+    state.asked[id] = list
+  end
+  local last = list.last + 1
+  list[last] = request
+  list.last = last
+  if list.first < last then
+    let_go(state, list, late)
+  end
+end
+
+local remember = M.remember
 
 --- A request. Returns "echo", "retry" or nil; and, of one that writes, the board it names (or nil) and true.
 function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
   local state, times = bus.state, bus.times
-  local flag
+  local flag, request
   local before = state.last[raw]
-  if before and not before.answered and state.latest - before.ended <= times.reply + GRACE then
+  if before and before.over then
+    -- The same bytes again, and nothing else knows the request before: its table serves again, which is half the work.
+    request = before
+    request.answered = false
+    request.over = false
+    request.echoed = false
+    request.slot = slot
+    request.number = number
+    request.ended = ends
+    request.side = side
+  elseif before and not before.answered and state.latest - before.ended <= times.reply + GRACE then
     local echo
     if bus.can then
       echo = false -- nothing on CAN hears itself
@@ -91,13 +112,7 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     end
     flag = "retry"
   end
-  local request
-  if before and before.over then
-    -- The same bytes again, and nothing else knows the request before: its table serves again, which is half the work.
-    request = before
-    request.answered, request.over, request.echoed, request.late = false, false, false, nil
-    request.slot, request.number, request.ended, request.side = slot, number, ends, side
-  else
+  if not request then
     local names = address >= 0x40 and address <= 0x4F
     request = {
       slot = slot,
@@ -120,12 +135,16 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     end
     state.last[raw] = request
   end
-  M.remember(state, id, request, times.late)
-  local host = request.host
-  if state.host and state.host ~= host and starts - state.host_ended <= times.reply + GRACE then
-    odd_of(bus.results, slot).second_host = true
+  remember(state, id, request, times.late)
+  local host, other = request.host, state.host
+  if host ~= other then
+    if other and starts - state.host_ended <= times.reply + GRACE then
+      odd_of(bus.results, slot).second_host = true
+    end
+    state.host = host
+    state.any = true
   end
-  state.host, state.host_ended, state.any = host, ends, true
+  state.host_ended = ends
   return flag, request.board, request.data ~= nil
 end
 
@@ -165,9 +184,9 @@ function M.answer(bus, slot, number, raw, address, id, starts)
   for i = list and list.last or 0, list and list.first or 1, -1 do
     local request = list[i]
     if not request.answered then
-      local fits = request.others or request.board == address
-      local old = state.latest - request.ended
-      if old > times.reply + GRACE then
+      local board = request.board
+      local fits = board == address or request.others
+      if state.latest - request.ended > times.reply + GRACE then
         if fits and not missed and not request.late and starts - request.ended <= times.late + GRACE then
           missed = request
         end
@@ -179,8 +198,7 @@ function M.answer(bus, slot, number, raw, address, id, starts)
           request.over = true
         end
         answered(bus, request.slot, number)
-        local board = request.board
-        if board and board ~= address and address >= 0x01 and address <= 0x10 then
+        if board ~= address and board and address >= 0x01 and address <= 0x10 then
           odd_of(bus.results, slot).other_board = board
         end
         if request.data and byte(raw, 4) == 8 then

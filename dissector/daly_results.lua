@@ -127,7 +127,9 @@ function M.note_reply(results, slot, link, wait, memory, table_in)
     results.more_count = count
   end
   results.entries[slot] = entry
-  results.newest, results.newest_wait, results.newest_memory = slot, wait, memory
+  results.newest = slot
+  results.newest_wait = wait
+  results.newest_memory = memory
 end
 
 --- Whether anything is known of a slot.
@@ -243,14 +245,20 @@ function M.answered(bus, slot, packet)
     M.later(bus, "entries", slot, entry)
     M.later(bus, "ended", slot, nil)
   else
-    results.entries[slot], results.ended[slot] = entry, nil
+    results.entries[slot] = entry
+    results.ended[slot] = nil
   end
 end
 
 --- An earlier frame's burst has its table in this packet.
 function M.note_table(bus, slot, packet)
   local results = bus.results
-  M.later(bus, "entries", slot, results.entries[slot] + TABLE * table_part(results, slot, packet))
+  local entry = results.entries[slot] + TABLE * table_part(results, slot, packet)
+  if bus.mark then
+    M.later(bus, "entries", slot, entry)
+  else
+    results.entries[slot] = entry
+  end
 end
 
 return M
