@@ -35,6 +35,19 @@ end)
 
 local packet_comment = Field.new("frame.comment")
 
+-- The first comment as words. From 4.4 on its lines come one by one, and then all of it. It is anybody's: neither a
+-- second line nor a terminal's control characters come of it.
+local function comment_words(first, ...)
+  local text = first and tostring(first.value) or ""
+  for i = 1, select("#", ...) do
+    local other = tostring((select(i, ...)).value)
+    if other:sub(1, #text) == text then
+      text = other
+    end
+  end
+  return (text:gsub("%c", " "):gsub("\xC2[\x80-\x9F]", " "))
+end
+
 -- The packet at hand: our protocol; what is known of its frames (daly_bus); whether anybody asked for a field of ours,
 -- and whether somebody looks at the tree; whether the capture was read to its end; the medium.
 local daly, results, wanted, visible, again, transport
@@ -625,8 +638,7 @@ local function one_record(parent, buffer, raw, item, pinfo)
   elseif kind == "frame" then
     text, source, destination = modbus(node, raw, item.slot)
   elseif kind == "event" then
-    local comment = packet_comment()
-    text = event_words(node, comment and tostring(comment.value) or "")
+    text = event_words(node, comment_words(packet_comment()))
   else
     text = damaged(node, kind, raw, item.name)
   end

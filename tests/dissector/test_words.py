@@ -102,6 +102,11 @@ def test_an_event_shows_its_comment(dissect: Dissect) -> None:
     assert info(row) == "Event: port lost: unplugged"
 
 
+def test_a_comment_is_one_line_without_control_characters(dissect: Dissect) -> None:
+    row = dissect([P("", comment="mark:\x1b[31m red\nsecond\tline\x9b1m 50 %d")])[0]
+    assert info(row) == "Event: mark: [31m red second line 1m 50 %d"
+
+
 def test_many_records_in_a_packet_are_counted(dissect: Dissect) -> None:
     row = dissect([P(a5(0x40, 0x91) * 6)])[0]
     assert info(row).endswith(" | and 2 more")
