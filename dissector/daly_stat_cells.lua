@@ -1,11 +1,19 @@
 -- SPDX-License-Identifier: GPL-2.0-or-later
 --
 -- Every cell and sensor of every board: how often it was seen, its lowest, mean, highest and last value, how often it
--- was the lowest or highest of all. From the tables of 0x95 and 0x96. Pure Lua, no Wireshark.
+-- was the lowest or highest of all. From the tables of 0x95 and 0x96, and of Modbus replies. Pure Lua, no Wireshark.
+
+local modbus_board = require("daly_modbus_board")
+local modbus_exchange = require("daly_modbus_exchange")
+local registers = require("daly_registers")
+local results_module = require("daly_results")
 
 local M = {}
 
 local byte, format, concat = string.byte, string.format, table.concat
+
+local A5, D2, READ = 0xA5, 0xD2, 0x03
+local DATA = 4 -- where the registers of a read reply stand
 
 local Report = {}
 Report.__index = Report
@@ -46,17 +54,47 @@ local function no_sensor(raw)
   return raw == 0 or raw == 0xFF
 end
 
+local function board_of(report, key)
+  local board = report.boards[key]
+  if not board then
+    board = { cells = {}, sensors = {} }
+    report.boards[key] = board
+  end
+  return board
+end
+
+-- A reply of Modbus: all its cells and all its sensors, where they are all among its registers.
+local function take_modbus(report, raw, slot, results)
+  local address, fn, length = byte(raw, 1, 3)
+  local memory = fn == READ and length == #raw - 5 and results_module.memory(results, slot)
+  if not memory then
+    return
+  end
+  local start, cells, sensors = modbus_board.unpack(memory)
+  local known, given = registers.MAPS[modbus_exchange.dialect(address)], length / 2
+  cells = cells and registers.all(known.cells, cells, registers.HIGHEST_CELL, raw, DATA, start, given)
+  sensors = sensors and registers.all(known.sensors, sensors, registers.HIGHEST_SENSOR, raw, DATA, start, given)
+  local key = modbus_exchange.board(address) or D2
+  if cells then
+    take(board_of(report, key).cells, cells, nil, 0)
+  end
+  if sensors then
+    take(board_of(report, key).sensors, sensors, no_sensor, 40)
+  end
+end
+
 --- Count one record.
-function Report:record(_, kind, raw, _, list)
-  if kind ~= "frame" or not list then
+function Report:record(_, kind, raw, slot, list, results)
+  if kind ~= "frame" then
+    return
+  elseif not list then
+    if byte(raw) ~= A5 and not results.can then
+      take_modbus(self, raw, slot, results)
+    end
     return
   end
   local address, id = byte(raw, 2, 3)
-  local board = self.boards[address]
-  if not board then
-    board = { cells = {}, sensors = {} }
-    self.boards[address] = board
-  end
+  local board = board_of(self, address)
   if id == 0x95 then
     take(board.cells, list, nil, 0)
   else
@@ -95,17 +133,18 @@ end
 --- The report as text.
 function Report:text()
   local lines = {}
-  for address = 0, 0x1F do
+  for address = 0, D2 do
     local board = self.boards[address]
     if board then
-      lines[#lines + 1] = format("Board %d", address)
+      lines[#lines + 1] = address == D2 and "D2 (names no board)" or format("Board %d", address)
       add_table(lines, board.cells, "cell", "mV")
       add_table(lines, board.sensors, "sensor", "C")
       lines[#lines + 1] = ""
     end
   end
   if #lines == 0 then
-    return "No table of cells was seen: that takes a 0x94 (how many there are) and all frames of a 0x95."
+    return "No table of cells was seen: that takes a 0x94 (how many there are) and all frames of a 0x95, "
+      .. "or a reply of Modbus with all of them."
   end
   return concat(lines, "\n")
 end

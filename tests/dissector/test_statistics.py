@@ -275,6 +275,32 @@ def test_cells_and_sensors(tshark: Tshark) -> None:
     assert ["1", "1", "20", "20.0", "20", "20", "1", "x", "1", "x"] in lines
 
 
+def test_cells_of_modbus(tshark: Tshark) -> None:
+    """Two reads of 64 registers: four cells and one sensor, at 3C and 3D; the second time each cell 10 mV higher."""
+    packets: list[P] = []
+    for dialect, ask_to, reply_from, cells_at, sensors_at, counts_at in (
+        ("81", "81", "51", 0x00, 0x30, 0x3C),
+        ("d2", "d2", "d2", 0x00, 0x20, 0x31),
+    ):
+        for poll, higher in enumerate((0, 10)):
+            values = [0] * 64
+            values[cells_at : cells_at + 4] = [3301 + higher, 3302 + higher, 3303 + higher, 3304 + higher]
+            values[sensors_at], values[counts_at : counts_at + 2] = 61, [4, 1]
+            at = poll + (10 if dialect == "d2" else 0)
+            packets.append(P(crc(f"{ask_to} 03 0000 0040"), at))
+            packets.append(P(crc(f"{reply_from} 03 80" + "".join(f"{value:04x}" for value in values)), at + 0.1))
+    text = ask(tshark, capture(tshark, packets), "daly,cells")
+    one, d2 = text.split("D2 (names no board)")
+    assert "Board 1" in one
+    for part in (one, d2):
+        lines = [line.split() for line in part.splitlines()]
+        assert ["1", "2", "3301", "3306.0", "3311", "3311", "2", "x", "0", "x"] in lines
+        assert ["4", "2", "3304", "3309.0", "3314", "3314", "0", "x", "2", "x"] in lines
+        assert ["spread", "2", "3", "3.0", "3", "3"] in lines
+        assert ["1", "2", "21", "21.0", "21", "21", "2", "x", "2", "x"] in lines
+        assert "5" not in {line[0] for line in lines if line}
+
+
 def test_faults_come_and_go(tshark: Tshark) -> None:
     packets = [P(a5(1, 0x98, "01"), 0), P(a5(1, 0x98, "02"), 2), P(a5(1, 0x98, "02"), 5), P(a5(2, 0x98), 6)]
     lines = ask(tshark, capture(tshark, packets), "daly,faults").splitlines()
