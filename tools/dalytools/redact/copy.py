@@ -182,11 +182,12 @@ class _Between:
     def finish(self) -> None:
         """Write the statistics of the interfaces that have some."""
         for number, old in sorted(self._statistics.items()):
-            if old.start_ns in _TIMES and old.end_ns in _TIMES:
+            start_ns, end_ns = old.start_ns, old.end_ns  # asked first: a range looks for None in all of its numbers
+            if start_ns is not None and end_ns is not None and start_ns in _TIMES and end_ns in _TIMES:
                 self._writer.write_statistics(
                     number,
-                    start_ns=old.start_ns or 0,
-                    end_ns=old.end_ns or 0,
+                    start_ns=start_ns,
+                    end_ns=end_ns,
                     received=old.received or 0,
                     dropped=old.dropped or 0,
                     os_dropped=old.os_dropped or 0,

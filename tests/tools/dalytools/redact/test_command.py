@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import itertools
 import json
+import struct
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.tools.dalytools.made import SAMPLES
-from tests.tools.dalytools.redact.planted import CODE, capture, texts, write_serial
+from tests.tools.dalytools.redact.planted import CODE, block, capture, texts, write_serial
 from tests.traffic import DESCRIPTIONS, Traffic
 
 from dalycapture.create import open_writer
@@ -45,6 +46,15 @@ def test_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert told["format"] == "dalyshark-redact"
     assert (told["packets"], told["records"], told["interfaces_renamed"]) == (3, 3, 1)
     assert told["blanked"] == [{"what": "battery code", "where": "A5 0x57", "records": 3, "bytes": 20}]
+
+
+def test_statistics_without_times_end(tmp_path: Path) -> None:
+    """Of an interface, as some programs write them; it must not take for ever, and nothing else is lost."""
+    path, out = write_serial(tmp_path / "in.pcapng", texts(0x57, CODE)), tmp_path / "out.pcapng"
+    with path.open("ab") as file:
+        file.write(block(5, struct.pack("<III", 0, 1, 1)))
+    assert main(["redact", str(path), "-w", str(out)]) == 0
+    assert len(list(read_capture(out))) == 3
 
 
 def test_a_capture_cut_off_gives_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
