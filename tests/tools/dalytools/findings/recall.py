@@ -44,8 +44,8 @@ FOUND_BY = {
     "late": Rule(("late", "wrong-board", "burst-repeat"), 0.01, 0.3),
     "echo": Rule(("echo",), 0.01, 0.01),
     "zero_reply": Rule(("zero-reply",), 0.01, 0.3),
-    # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus (0.27 s),
-    # with less than 250 ms between them.
+    # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus
+    # (0.27 s), with less than 250 ms between them.
     "damaged": Rule(("damaged", "line-errors"), 0.52, 0.3),
     # Two that begin at once can sum up right: a reply of nobody. One right behind the other harms no byte.
     "collision": Rule(("damaged", "line-errors", "zero-reply", "unasked", "unanswered"), 0.3, 0.3),

@@ -85,7 +85,7 @@ def test_a_foreign_device_is_not_told_from_damage_in_the_same_gap() -> None:
 
 
 def test_damage_that_left_nothing_is_no_good_frame() -> None:
-    note = {"what": "damaged", "time": 5.0}
+    note = {"what": "damaged", "time": 5.0, "heard": "a501"}
     assert hidden(note, [heard(5.0, 1, 0x90)], [note])
     assert not hidden(note, [heard(6.0, 1, 0x90)], [note])
     collision = {**note, "what": "collision"}
@@ -181,6 +181,14 @@ def test_a_foreign_device_right_behind_damage_may_end_a_frame_by_accident() -> N
     assert hidden(note, [accident, rest], [damaged, note])
     assert not hidden(note, [accident, Frame(5.0, 17, first=1)], [damaged, note])
     assert not hidden(note, [accident, rest], [note])
+
+
+def test_noise_at_the_beginning_may_be_the_end_of_a_frame() -> None:
+    note = {"what": "damaged", "time": 0.0, "heard": "70fd8ea549"}
+    noise, asked = Frame(0.0, 3, first=0x70), heard(0.003, 0x49, 0x90)
+    assert hidden(note, [noise, asked], [note])
+    assert not hidden({**note, "heard": "a54990"}, [noise, asked], [note])
+    assert not hidden({**note, "time": 1.0}, [asked, noise._replace(seconds=1.0)], [note])
 
 
 def test_an_echo_behind_another_boards_answer_is_a_request() -> None:

@@ -56,6 +56,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("late", _answers_newer_of_modbus, "it answers a newer request of Modbus (wires.md 1)"),
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
+        ("damaged", _begins_the_capture, "a capture that begins so may have joined in the middle of a frame"),
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
         ("collision", _good_by_accident, "its bytes are a good frame by accident"),
         ("foreign", _swallowed, "damage that is a good frame by accident took its first bytes"),
@@ -217,6 +218,10 @@ def _board_was_damaged(note: Note, notes: list[Note]) -> bool:
         and sent_by(other, int(str(note["board"])))
         for other in during(notes, at(note) - 1e-3, at(note) + BURST_QUIET_S)
     )
+
+
+def _begins_the_capture(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    return not str(note["heard"]).startswith("a5") and not between(heard, -1e9, at(note) - 1e-6)
 
 
 def _good_by_accident(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
