@@ -49,6 +49,8 @@ class Burst(Generic[T]):
     """End of its last frame."""
     open_until_ns: int = 0
     """It ends when a record begins later."""
+    settled: bool = False
+    """Its records, all that came so far, are final."""
     whole: bool = True
     """No number is missing so far."""
     parts: list[T] = field(default_factory=list[T])

@@ -73,7 +73,7 @@ class Bus:
         if slate.asks and known:
             slate.fields["daly.unanswered"] = True
         if slate.burst is not None and slate.burst is self._burst:
-            self._end_burst(known=known)
+            parts.end(slate.burst, known=known)  # one that began in time, and ends later, goes on with it
         slate.close()
 
     def _request(self, located: Located, message: Message, slate: Slate) -> None:
@@ -184,11 +184,11 @@ class Bus:
         count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
         return Burst(data_id, address, base, count, request, slate)
 
-    def _end_burst(self, *, known: bool = True) -> None:
-        """End the running burst. known: it is sure that it has ended, the capture does not merely stop."""
+    def _end_burst(self) -> None:
+        """End the running burst."""
         burst, self._burst = self._burst, None
         if burst is not None:
-            parts.end(burst, known=known)
+            parts.end(burst)
 
 
 def _seen(located: Located) -> Seen:

@@ -38,6 +38,7 @@ def take(burst: Burst[Slate], located: Located, content: bytes, slate: Slate, qu
     burst.last, burst.end_ns = number, located.end_ns
     burst.owner, burst.owner_number = slate, located.packet.number
     burst.open_until_ns = located.end_ns + quiet_ns
+    burst.settled = False
     if data_id in cells.SLOTS:
         fields.update(cells.decode(data_id, content, cells.used(data_id, number, burst.base, burst.count)))
         burst.values[number] = cells.cells(content) if data_id == cells.CELLS else tuple(content[1:])
@@ -67,7 +68,10 @@ def _link(burst: Burst[Slate], packet: int) -> None:
 
 
 def end(burst: Burst[Slate], *, known: bool = True) -> None:
-    """End a burst. known: it is sure that it has ended, the capture does not merely stop."""
+    """End a burst, as far as it came. known: it is sure that it has ended, the capture does not merely stop."""
+    if burst.settled:
+        return
+    burst.settled = True
     if burst.needs_end:
         whole = burst.table()
         if whole:
@@ -78,3 +82,4 @@ def end(burst: Burst[Slate], *, known: bool = True) -> None:
         burst.owner.fields["daly.burst.cut_off"] = True
     for part in (*burst.parts, burst.owner):
         part.close()
+    burst.parts.clear()

@@ -3,9 +3,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 from tests.tools.dalyref import real
-from tests.tools.dalyref.traffic import FRAME_MS, Capture, frame
+from tests.tools.dalyref.traffic import EPOCH_NS, FRAME_MS, Capture, frame
+
+from dalyref.decoder import decode
+from dalyref.packet import Packet
+
+if TYPE_CHECKING:
+    from dalyref.packet import Direction
 
 ASK = frame(0x40, 0x95)
 
@@ -278,3 +286,26 @@ def test_requests_echoes_and_damage_leave_memory_alone() -> None:
     capture = burst(counts(4), frame(0x40, 0x94, 9, 9), frame(0x40, 0x94, 9, 9), damaged, cells(2, 4, 5, 6))
     assert capture.field("daly.kind")[3] == "bad_checksum"
     assert capture.field("daly.cell.voltage")[-1] == 4
+
+
+def test_a_frame_of_tcp_that_was_begun_in_time_goes_on_with_its_burst() -> None:
+    """The quiet is up to the reply's beginning (records.md 8), whatever the other side says before its last byte."""
+    first, second = cells(1, 1, 2, 3), cells(2, 4, 5, 6)
+    asks = bytes.fromhex("d20300200001") + b"\x96\x63"
+
+    def piece(number: int, seconds: int, data: bytes, direction: Direction = "inbound") -> Packet:
+        time_ns = EPOCH_NS + seconds * 10**9
+        return Packet(number, time_ns, data, transport="tcp", connection="a", direction=direction)
+
+    packets = [
+        piece(1, 0, frame(0x40, 0x95), "outbound"),
+        piece(2, 0, first + second[:5]),
+        piece(3, 20, asks, "outbound"),
+        piece(4, 21, second[5:]),
+        piece(5, 22, frame(0x40, 0x90), "outbound"),
+    ]
+    records = [record for record in decode(packets) if record.number in {2, 4}]
+    assert [record.fields["daly.frame_number"] for record in records] == [1, 2]
+    assert records[1].fields["daly.request_in"] == 1
+    assert not {"daly.unasked", "daly.burst.missing", "daly.burst.repeat"} & records[1].fields.keys()
+    assert records[1].fields["daly.cell.voltage"] == [4, 5, 6]
