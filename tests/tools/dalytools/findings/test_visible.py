@@ -205,3 +205,23 @@ def test_a_burst_of_which_nothing_came_shows_no_hole() -> None:
     assert hidden(note, [heard(5.6, 16, 0x95, "01")], [note, damaged])
     assert not hidden(note, [heard(5.09, 16, 0x95, "02")], [note, damaged])
     assert not hidden(note, [heard(5.6, 16, 0x95, "01")], [note])
+
+
+def test_a_state_that_changed_explains_a_voltage() -> None:
+    """0x93 tells charging, discharging or neither (records.md 11)."""
+    note = {"what": "contradiction", "time": 5.0, "board": 1, "name": "cell_max", "data_id": 0x91}
+    table = [heard(1, 1, 0x94, "0601"), heard(6, 1, 0x95, "010ce4"), heard(6.0136, 1, 0x95, "020ce4")]
+    before, after = heard(4, 1, 0x93, "020101"), heard(5.5, 1, 0x93, "000100")
+    says = heard(4.98, 1, 0x91, "0d0d")
+    assert hidden(note, [table[0], before, says, after, *table[1:]], [note])
+    assert not hidden(note, [table[0], before, says, after._replace(payload=before.payload), *table[1:]], [note])
+    assert not hidden(note, [table[0], before, says, after._replace(address=2), *table[1:]], [note])
+
+
+def test_a_request_that_is_an_error_frame() -> None:
+    note = {"what": "unanswered", "time": 5.0, "address": 0x4B, "data_id": 0xD8, "why": "damaged"}
+    damaged = {"what": "damaged", "time": 5.0, "heard": "a54bd8"}
+    assert hidden(note, [], [note, damaged])
+    assert hidden(note, [Frame(5.0, 16)], [note, damaged])
+    assert not hidden(note, [heard(5.0, 0x4B, 0xD8)], [note, damaged])
+    assert not hidden(note, [Frame(5.0, 16)], [note])

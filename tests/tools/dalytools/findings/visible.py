@@ -25,6 +25,8 @@ LATE_S = 0.5
 """From when on ``check`` calls a reply late."""
 MOST_REPLY_S = 0.15
 """A simulated board begins to answer within that."""
+ERROR_SIZE = 16
+"""Bytes of an error frame, as of any frame of CAN."""
 SAID_S = 0.03
 """A single frame takes 13.5 ms, with noise a little more; what it says is noted at its end."""
 FAULTS = 0x98
@@ -85,7 +87,8 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
 
 def _is_error_frame(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     damaged = any(other["what"] in {"damaged", "collision"} and other["time"] == note["time"] for other in notes)
-    return damaged and not between(heard, at(note) - 1e-6, at(note) + 1e-6)
+    there = between(heard, at(note) - 1e-6, at(note) + 1e-6)
+    return damaged and not any(frame.good or frame.size != ERROR_SIZE for frame in there)
 
 
 def _reply_is_error_frame(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
@@ -338,4 +341,10 @@ def _load_stepped(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
         [frame for frame in told if frame.seconds < time][-1:], [frame for frame in told if frame.seconds > time][:1]
     )
     currents = [int.from_bytes(frame.payload[4:6]) for frame in near]
+    states = [frame for frame in heard if frame.address == note["board"] and frame.data_id == 0x93]
+    around = [frame for frame in states if frame.seconds < time][-1:] + [
+        frame for frame in states if frame.seconds > time
+    ][:1]
+    if len({frame.payload[0] for frame in around if any(frame.payload)}) > 1:
+        return True
     return max(currents, default=0) - min(currents, default=0) > STEP_RAW
