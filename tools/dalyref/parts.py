@@ -29,6 +29,8 @@ def take(burst: Burst[Slate], located: Located, content: bytes, slate: Slate, qu
     quiet_ns: the burst ends after so long. Of a burst that has just begun, `last` is one less than its base or more.
     """
     fields, number, data_id = slate.fields, content[0], burst.data_id
+    if burst.settled and not burst.count:
+        burst.whole_in = 0  # what was final before stands; the whole is in a later one
     missing = range(burst.last + 1, number)
     if number == burst.last:
         fields["daly.burst.repeat"] = True

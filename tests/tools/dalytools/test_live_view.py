@@ -48,7 +48,7 @@ def test_a_line_a_packet() -> None:
         [
             "    1      0.000  Request board 1  0x90 Pack",
             "    2      0.014  Reply board 1  0x90 Pack: 24.8 V  0.0 A  SOC 38.5 %",
-            "    3      0.027  Event: \\x1b[2J",
+            "    3      0.027  Event:  [2J",  # the dissector shows a control character as a blank
             "    4      0.041  Junk  2 bytes  01 02 | Request board 1  0x90 Pack",
         ],
         [],
