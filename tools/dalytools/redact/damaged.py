@@ -10,6 +10,8 @@ foreign        the frames of other protocols keep their shape, and their check b
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from dalyref import a5, bluetooth_module, foreign, modbus
@@ -21,7 +23,10 @@ if TYPE_CHECKING:
     from dalyref.kinds import Record
     from dalytools.redact.blanker import Blanker
 
+_Step = Callable[[bytes, int, int], int]
+_One = Callable[[bytes, "Blanker"], bytes]
 _HEAD: Final = 4
+_SINOWEALTH_HEAD: Final = 3
 _MODBUS_HEADS: Final = {modbus.READ: 3, modbus.WRITE_ONE: 4, modbus.WRITE_MANY: 7}
 """Address, function, and what says how long the frame would be."""
 
@@ -67,14 +72,14 @@ def junk(data: bytes, blanker: Blanker) -> bytes:
 
 def others(record: Record, blanker: Blanker) -> bytes:
     """Blank what frames of other protocols carry."""
-    if record.foreign == foreign.MODBUS:
-        return _foreign_modbus(record.data, blanker)
-    if record.foreign == foreign.SINOWEALTH:
-        return _sinowealth(record.data, blanker)
-    if record.foreign == foreign.PYLONTECH:
-        return _pylontech(record.data, blanker)
-    if record.foreign == foreign.JBD:
-        return _jbd(record.data, blanker)
+    if record.foreign in _FRAMES:
+        step, one = _FRAMES[record.foreign]
+        out, at, data = b"", 0, record.data
+        while at < len(data):
+            stop = step(data, at, len(data))
+            out += one(data[at:stop], blanker)
+            at = stop
+        return out
     if bluetooth_module.is_text(record.data):
         return _module_text(record.data, blanker)
     return modbus_data.blank(record.data, None, blanker)
@@ -88,17 +93,10 @@ def _module_text(data: bytes, blanker: Blanker) -> bytes:
     return data[:head] + blanker.given(data[head:], letters, What.FOREIGN, "text of the Bluetooth module")
 
 
-def _foreign_modbus(data: bytes, blanker: Blanker) -> bytes:
-    out = b""
-    at = 0
-    while at < len(data):
-        stop = foreign.modbus_step(data, at, len(data))
-        frame = data[at:stop]
-        head = _foreign_head(frame)
-        content = blanker.whole(frame[head:-2], What.FOREIGN, foreign.MODBUS)
-        out += frame if content == frame[head:-2] else modbus_data.with_crc(frame[:head] + content)
-        at = stop
-    return out
+def _modbus(frame: bytes, blanker: Blanker) -> bytes:
+    head = _foreign_head(frame)
+    content = blanker.whole(frame[head:-2], What.FOREIGN, foreign.MODBUS)
+    return frame if content == frame[head:-2] else modbus_data.with_crc(frame[:head] + content)
 
 
 def _foreign_head(frame: bytes) -> int:
@@ -113,19 +111,33 @@ def _foreign_head(frame: bytes) -> int:
     return size - 2
 
 
-def _sinowealth(data: bytes, blanker: Blanker) -> bytes:
-    out = b""
-    at = 0
-    while at < len(data):
-        stop = foreign.sinowealth_step(data, at, len(data), ended=True)
-        exchange = data[at:stop]
-        if len(exchange) > 3:
-            content = blanker.whole(exchange[3:-1], What.FOREIGN, foreign.SINOWEALTH)
-            body = exchange[:3] + content
-            exchange = body + bytes((foreign.crc8(body),))
-        out += exchange
-        at = stop
-    return out
+def _sinowealth(exchange: bytes, blanker: Blanker) -> bytes:
+    if len(exchange) <= _SINOWEALTH_HEAD:
+        return exchange
+    content = blanker.whole(exchange[_SINOWEALTH_HEAD:-1], What.FOREIGN, foreign.SINOWEALTH)
+    body = exchange[:_SINOWEALTH_HEAD] + content
+    return body + bytes((foreign.crc8(body),))
+
+
+def _pylontech(frame: bytes, blanker: Blanker) -> bytes:
+    head, digits = frame[: foreign.PYLONTECH_HEAD], frame[foreign.PYLONTECH_HEAD : -5]
+    body = head + blanker.given(digits, b"0" * len(digits), What.FOREIGN, foreign.PYLONTECH)
+    return body + b"%04X\r" % foreign.complement(body[1:])
+
+
+def _jbd(frame: bytes, blanker: Blanker) -> bytes:
+    head = frame[: foreign.JBD_HEAD]
+    body = head + blanker.whole(frame[foreign.JBD_HEAD : -3], What.FOREIGN, foreign.JBD)
+    return body + foreign.complement(body[2:]).to_bytes(2) + frame[-1:]
+
+
+_FRAMES: Final[dict[str, tuple[_Step, _One]]] = {
+    foreign.MODBUS: (foreign.modbus_step, _modbus),
+    foreign.SINOWEALTH: (partial(foreign.sinowealth_step, ended=True), _sinowealth),
+    foreign.PYLONTECH: (foreign.pylontech_step, _pylontech),
+    foreign.JBD: (foreign.jbd_step, _jbd),
+}
+"""Of each maker: where the frame at a place ends, and what stands in the copy for it."""
 
 
 def blank(record: Record, blanker: Blanker) -> bytes:
@@ -137,28 +149,3 @@ def blank(record: Record, blanker: Blanker) -> bytes:
     if record.kind is Kind.FOREIGN:
         return others(record, blanker)
     return junk(record.data, blanker)
-
-
-def _pylontech(data: bytes, blanker: Blanker) -> bytes:
-    out = b""
-    at = 0
-    while at < len(data):
-        stop = foreign.pylontech_step(data, at, len(data))
-        frame, head = data[at:stop], foreign.PYLONTECH_HEAD
-        content = blanker.given(frame[head:-5], b"0" * len(frame[head:-5]), What.FOREIGN, foreign.PYLONTECH)
-        body = frame[:head] + content
-        out += body + b"%04X\r" % foreign.complement(body[1:])
-        at = stop
-    return out
-
-
-def _jbd(data: bytes, blanker: Blanker) -> bytes:
-    out = b""
-    at = 0
-    while at < len(data):
-        stop = foreign.jbd_step(data, at, len(data))
-        frame, head = data[at:stop], foreign.JBD_HEAD
-        body = frame[:head] + blanker.whole(frame[head:-3], What.FOREIGN, foreign.JBD)
-        out += body + foreign.complement(body[2:]).to_bytes(2) + frame[-1:]
-        at = stop
-    return out
