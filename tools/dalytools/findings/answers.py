@@ -11,6 +11,7 @@ from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
 from dalytools.findings.place import REPLY, REQUEST, Place, address_of, first_number, number, place_of, words
 from dalytools.findings.rules import found
+from dalytools.findings.waiting import Waiting
 from dalytools.findings.watch import Groups, Watch
 from dalytools.terminal_text import counted
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 _REMEMBERED = 1024  # requests
 _MOST_FRAMES = 16  # paper 3, 0x95
 _QUIET_NS = 500_000_000
-_WAITS_NS = 1_020_000_000  # 1 s from a request's end
 
 
 @dataclass(slots=True)
@@ -65,7 +65,7 @@ class Answers(Watch):
         self._running: dict[Place, _Running] = {}
         self._lengths = Groups(_Length)
         self._askers: OrderedDict[int, int | None] = OrderedDict()  # request's packet: its address
-        self._unanswered: dict[tuple[str, int], tuple[int, int | None]] = {}  # bus, data ID: when (ns), by whom
+        self._waiting = Waiting[tuple[str, int], int]()  # bus, data ID: by whom
         self._cells: dict[Place, object] = {}  # newest counts, by board
         self._now_ns = 0
 
@@ -80,8 +80,8 @@ class Answers(Watch):
             asker = first_number(fields, "daly.can.source", "daly.address", "daly.modbus.address")
             self._askers[record.number] = asker
             data_id = number(fields, "daly.data_id")
-            if data_id is not None and "daly.unanswered" in fields:
-                self._unanswered[bus, data_id] = record.time_ns, asker
+            if data_id is not None and asker is not None and "daly.unanswered" in fields:
+                self._waiting.ask((bus, data_id), record.time_ns, asker)
             if len(self._askers) > _REMEMBERED:
                 self._askers.popitem(last=False)
             return
@@ -140,8 +140,8 @@ class Answers(Watch):
         if "daly.burst.missing" in fields or "daly.burst.cut_off" in fields or not request:
             running.whole = False
         # One of two who asked at once: whom the board heard is not told by the reply (records.md 7).
-        other = self._unanswered.get((place.bus, number(fields, "daly.data_id") or 0))
-        if other is not None and other[1] != running.asker and 0 <= record.time_ns - other[0] <= _WAITS_NS:
+        other = self._waiting.at((place.bus, number(fields, "daly.data_id") or 0), record.time_ns)
+        if other is not None and other != running.asker:
             running.whole = False
 
     def _end(self, place: Place, running: _Running) -> None:

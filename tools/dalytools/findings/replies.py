@@ -11,6 +11,7 @@ from dalyref.kinds import Kind
 from dalytools.findings.finding import Tally
 from dalytools.findings.place import ECHO, REPLY, REQUEST, number, place_of
 from dalytools.findings.rules import found
+from dalytools.findings.waiting import Waiting
 from dalytools.findings.watch import Groups, Watch
 from dalytools.terminal_text import counted
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from dalytools.findings.limits import Limits
 
 _REMEMBERED = 1024  # requests
-_WAITS_NS = 1_020_000_000  # 1 s from its end
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class Replies(Watch):
         self._unasked = Groups(Tally)
         self._asked: OrderedDict[int, tuple[int, int | None]] = OrderedDict()  # packet: time (ns), board
         self._newest: dict[int, int] = {}  # data ID: the board that the newest request names
-        self._unanswered: dict[tuple[str, int, int], int] = {}  # bus, data ID, board: newest such request (ns)
+        self._waiting = Waiting[tuple[str, int, int], int]()  # bus, data ID, board: of whom
 
     def record(self, record: Decoded, bus: str) -> None:
         """See requests, to know when and whom they asked; count replies."""
@@ -64,8 +64,8 @@ class Replies(Watch):
             data_id = number(record.fields, "daly.data_id")
             if data_id is not None and board is not None:
                 self._newest[data_id] = board
-                if "daly.unanswered" in record.fields and len(self._unanswered) < _REMEMBERED:
-                    self._unanswered[bus, data_id, board] = record.time_ns
+                if "daly.unanswered" in record.fields:
+                    self._waiting.ask((bus, data_id, board), record.time_ns, board)
         elif direction == REPLY:
             self._reply(record, bus)
 
@@ -103,10 +103,11 @@ class Replies(Watch):
         The reply goes to the newest request that takes it (records.md 7): one to 40 takes any board's.
         """
         data_id, board = number(record.fields, "daly.data_id"), number(record.fields, "daly.board")
-        if data_id is None or board is None:
-            return False
-        asked_ns = self._unanswered.get((bus, data_id, board))
-        return asked_ns is not None and 0 <= record.time_ns - asked_ns <= _WAITS_NS
+        return (
+            data_id is not None
+            and board is not None
+            and self._waiting.at((bus, data_id, board), record.time_ns) is not None
+        )
 
     def findings(self) -> Iterator[Finding]:
         """Say which replies were not as they should be."""
