@@ -12,6 +12,8 @@ from tests.tools.dalytools.findings.heard import A5_SIZE, BURSTS, DALYS_MODBUS, 
 from tests.tools.dalytools.findings.moments import at, during
 from tests.tools.dalytools.findings.own_answers import answers
 from tests.tools.dalytools.findings.visible import (
+    ANSWERS_81,
+    D2,
     ECHOES_S,
     LONGEST_S,
     RECENT_S,
@@ -25,6 +27,9 @@ from tests.tools.dalytools.findings.visible import (
 if TYPE_CHECKING:
     from tests.tools.dalytools.findings.moments import Moment, Note
 
+MOS = 0x93
+SETTLED_S = 2.1
+"""From the end of the reply that takes a switch: so long its state is not looked at."""
 SAID_BY = {
     "pack_voltage": {0x90, 0x94, 0x95},
     "cell_max": {0x91, 0x94, 0x95},
@@ -66,6 +71,8 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
         or _second_answer(moment, heard, notes)
     ):
         return True
+    if moment.rule == "write-no-effect" and moment.place.data_id is not None and _told_late(moment, heard, notes):
+        return True
     if moment.rule == "zero-reply" and _behind_zeros(moment, heard, notes):
         return True
     if moment.rule == "contradiction" and _counts_from_one(moment, heard, notes):
@@ -86,8 +93,27 @@ def _fell_apart(moment: Moment, heard: list[Frame]) -> bool:
         near = between(heard, moment.seconds - LONGEST_S, moment.seconds + 1e-6)
         return any(frame.falls_apart and moment.seconds < frame.ends for frame in near)
     if moment.rule in {"unanswered", "silent", "asleep"} and moment.place.data_id is None:
-        return any(frame.falls_apart for frame in between(heard, moment.seconds, moment.seconds + WAITS_S))
+        answers_from = D2 if moment.place.board is None else ANSWERS_81 + moment.place.board
+        soon = between(heard, moment.seconds, moment.seconds + WAITS_S)
+        return any(frame.falls_apart and frame.first == answers_from for frame in soon)
     return False
+
+
+def _told_late(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it is the board's first state since it took a switch long ago: it slept, or was not asked."""
+    written = [
+        note
+        for note in during(notes, 0, moment.seconds)
+        if (note["what"], note.get("data_id"), note.get("result")) == ("write", moment.place.data_id, "confirmed")
+    ]
+    states = [
+        frame
+        for frame in heard
+        if (frame.address, frame.data_id) == (moment.place.board, MOS) and frame.seconds < moment.seconds - 1e-6
+    ]
+    return bool(written) and not any(
+        frame.seconds > at(written[-1]) + SETTLED_S for frame in states if any(frame.payload)
+    )
 
 
 def _repeats_a_collision(moment: Moment, heard: list[Frame], notes: list[Note]) -> bool:

@@ -44,9 +44,8 @@ FOUND_BY = {
     "late": Rule(("late", "wrong-board", "burst-repeat"), 0.01, 0.3),
     "echo": Rule(("echo",), 0.01, 0.01),
     "zero_reply": Rule(("zero-reply",), 0.01, 0.3),
-    # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus
-    # (0.27 s), with less than 250 ms between them.
-    "damaged": Rule(("damaged", "line-errors"), 0.52, 0.3),
+    # A damaged record begins with the first of several damaged frames in a row, which may be a long one of Modbus.
+    "damaged": Rule(("damaged", "line-errors"), 0.35, 0.3),
     # Two that begin at once can sum up right: a reply of nobody. One right behind the other harms no byte.
     "collision": Rule(("damaged", "line-errors", "zero-reply", "unasked", "unanswered"), 0.3, 0.3),
     # Behind the last cell or sensor there is nothing to miss: another number of frames than usual.
@@ -110,8 +109,7 @@ NAMED = {"contradiction", "fault_present", "fault_raised"}
 STATES = {"mos_off_by_command", "charging_cabinet_offline"}
 """Bits that are no faults (docs/protocol.md, a.98)."""
 AGO_S = 1.5
-LONG_AGO_S = {"contradiction": 11.0, "burst-length": 20.0, "write-no-effect": 60.0}
-"""A board that sleeps tells late what became of a switch."""
+LONG_AGO_S = {"contradiction": 11.0, "burst-length": 20.0, "write-no-effect": 20.0}
 OF_THE_SCENARIO = {"two-hosts", "not-polled"}
 """Rules that find what a scenario is, not what happens in it."""
 

@@ -197,6 +197,7 @@ def test_a_reply_of_modbus_with_an_a5_frame_inside_falls_apart(tmp_path: Path) -
         assert explained(moment, apart, [], 1.5) is told
     asked = Moment("unanswered", Place(address=0xD2, register=0), Severity.WARNING, 1.0)
     assert explained(asked, apart, [], 1.5)
+    assert not explained(asked._replace(place=Place(board=4, register=0)), apart, [], 1.5)
     assert not explained(asked._replace(seconds=2.5), apart, [], 1.5)
 
 
@@ -216,3 +217,13 @@ def test_a_request_that_another_host_repeats_within_100_ms_is_an_echo() -> None:
     assert explained(counted("echo", 1.094), both, [note], 1.5)
     assert not explained(counted("echo", 1.094), both, [{**note, "why": "silent"}], 1.5)
     assert not explained(counted("echo", 1.2), [both[0], heard(1.2, 0x40, 0x93)], [note], 1.5)
+
+
+def test_a_board_that_slept_tells_late_what_became_of_a_switch() -> None:
+    written = {"what": "write", "time": 5.0, "data_id": 0xDA, "result": "confirmed"}
+    says = counted("write-no-effect", 28.0, data_id=0xDA)
+    before, soon, late = heard(4.0, 1, 0x93, "0201"), heard(6.8, 1, 0x93, "0201"), heard(28.0, 1, 0x93, "0201")
+    assert explained(says, [before, soon, late], [written], 20.0)
+    assert not explained(says, [before, soon, heard(9.0, 1, 0x93, "0201"), late], [written], 20.0)
+    assert not explained(says, [before, soon, late], [{**written, "data_id": 0xD9}], 20.0)
+    assert not explained(says, [before, soon, late], [{**written, "result": "denied"}], 20.0)

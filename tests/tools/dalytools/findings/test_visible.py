@@ -225,3 +225,15 @@ def test_a_request_that_is_an_error_frame() -> None:
     assert hidden(note, [Frame(5.0, 16)], [note, damaged])
     assert not hidden(note, [heard(5.0, 0x4B, 0xD8)], [note, damaged])
     assert not hidden(note, [Frame(5.0, 16)], [note])
+
+
+def test_damage_right_behind_damage_is_of_the_same_record() -> None:
+    """A reply of 153 bytes and, less than 250 ms later, one byte: one packet, 0.4 s from beginning to beginning."""
+    first = {"what": "damaged", "time": 5.0, "heard": "51" * 153}
+    note = {"what": "damaged", "time": 5.4, "heard": "a5"}
+    asked, both = heard(4.9, 0x40, 0x90), Frame(5.0, 154, first=0x51)
+    assert hidden(note, [asked, both], [first, note])
+    assert not hidden({**note, "time": 5.5}, [asked, both], [first, note])  # silence
+    assert not hidden(note, [asked, both._replace(modbus=True)], [first, note])
+    assert not hidden(note, [asked, both._replace(size=153), Frame(5.4, 1, first=0xA5)], [first, note])
+    assert not hidden(note, [asked, both], [note])

@@ -59,6 +59,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
         ("late", _answers_another, "it answers a newer request for this ID (records.md 7)"),
         ("other_board", _answers_another, "it answers a request that names no board (records.md 7)"),
         ("damaged", _begins_the_capture, "a capture that begins so may have joined in the middle of a frame"),
+        ("damaged", _goes_on, "it is of the damaged record before it: no silence between (records.md 1)"),
         ("damaged", _good_by_accident, "its bytes are a good frame by accident"),
         ("collision", _good_by_accident, "its bytes are a good frame by accident"),
         ("foreign", _swallowed, "damage that is a good frame by accident took its first bytes"),
@@ -225,6 +226,23 @@ def _board_was_damaged(note: Note, notes: list[Note]) -> bool:
 
 def _begins_the_capture(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
     return not str(note["heard"]).startswith("a5") and not between(heard, -1e9, at(note) - 1e-6)
+
+
+def _goes_on(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
+    """Tell whether it is in one packet with damaged bytes that ended less than 250 ms before."""
+    before = between(heard, -1e9, at(note) + 1e-6)
+    if not before or _whole(before[-1]) or abs(before[-1].seconds - at(note)) < 1e-3:
+        return False
+    first = before[-1]
+    return any(
+        first.size == _size(other) + _size(note) and at(note) - at(other) - _size(other) / 960 <= SILENCE_S
+        for other in during(notes, first.seconds - 1e-3, first.seconds + 1e-3)
+        if other["what"] == "damaged"
+    )
+
+
+def _size(note: Note) -> int:
+    return len(str(note["heard"])) // 2
 
 
 def _good_by_accident(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
