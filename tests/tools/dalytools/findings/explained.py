@@ -14,12 +14,14 @@ from tests.tools.dalytools.findings.own_answers import answers
 from tests.tools.dalytools.findings.visible import (
     ANSWERS_81,
     D2,
+    ECHO,
     ECHOES_S,
     LONGEST_S,
     RECENT_S,
     WAITS_S,
     comes_late,
     exception_fits,
+    hidden,
     same_request,
     there_at,
 )
@@ -51,7 +53,7 @@ def explained(moment: Moment, heard: list[Frame], notes: list[Note], ago: float)
     if moment.rule == "echo":
         return _repeats_a_collision(moment, heard, notes) or any(
             note["what"] == "unanswered"
-            and note.get("why") in {"busy", "damaged"}
+            and (note.get("why") in {"busy", "damaged"} or hidden(note, heard, notes).endswith(ECHO))
             and same_request(note, seconds, heard)
             for note in during(notes, seconds - ECHOES_S, seconds + 1e-3)
         )

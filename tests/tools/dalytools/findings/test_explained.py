@@ -216,6 +216,8 @@ def test_a_request_that_another_host_repeats_within_100_ms_is_an_echo() -> None:
     both = [heard(1.0, 0x40, 0x93), heard(1.094, 0x40, 0x93)]
     assert explained(counted("echo", 1.094), both, [note], 1.5)
     assert not explained(counted("echo", 1.094), both, [{**note, "why": "silent"}], 1.5)
+    two = [{**note, "why": "silent", "host": "host"}, {**note, "why": "silent", "host": "monitor", "time": 1.094}]
+    assert explained(counted("echo", 1.094), both, two, 1.5)
     assert not explained(counted("echo", 1.2), [both[0], heard(1.2, 0x40, 0x93)], [note], 1.5)
 
 

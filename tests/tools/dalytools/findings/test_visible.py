@@ -45,6 +45,9 @@ def test_an_echo_of_another_host_is_no_request() -> None:
     assert hidden(note, both, [note])
     assert not hidden(note, both[1:], [note])
     assert not hidden({**note, "why": "silent"}, both, [note])
+    silent = {**note, "why": "silent", "host": "monitor"}
+    assert hidden(silent, both, [{**silent, "time": 1.0, "host": "host"}, silent])
+    assert not hidden(silent, both, [{**silent, "time": 1.0}, silent])  # its own
     assert not hidden(note, [frame._replace(size=16) for frame in both], [note])
 
 

@@ -27,6 +27,7 @@ MOST_REPLY_S = 0.15
 """A simulated board begins to answer within that."""
 ERROR_SIZE = 16
 """Bytes of an error frame, as of any frame of CAN."""
+ECHO = "an echo (records.md 6)"
 SAID_S = 0.03
 """A single frame takes 13.5 ms, with noise a little more; what it says is noted at its end."""
 FAULTS = 0x98
@@ -50,7 +51,7 @@ def hidden(note: Note, heard: list[Frame], notes: list[Note]) -> str:
     for what, told, why in (
         ("unanswered", _is_error_frame, "its request is an error frame on CAN"),
         ("unanswered", _answered_otherwise, "another reply of this ID answers it (records.md 7)"),
-        ("unanswered", _is_an_echo, "within 100 ms of the same request of another host: an echo (records.md 6)"),
+        ("unanswered", _is_an_echo, f"within 100 ms of the same request of another host: {ECHO}"),
         ("unanswered", _swallowed, "damage that is a good frame by accident took its first bytes"),
         ("unanswered", _left_whole, "two spoke at once, and its reply was left whole"),
         ("unanswered", exception_fits, "an exception of D2 fits each request that waits (wires.md 1)"),
@@ -111,7 +112,17 @@ def _answered_otherwise(note: Note, heard: list[Frame], notes: list[Note]) -> bo
 
 
 def _is_an_echo(note: Note, heard: list[Frame], notes: list[Note]) -> bool:
-    return note.get("why") == "busy" and same_request(note, at(note), heard)
+    return same_request(note, at(note), heard) and (note.get("why") == "busy" or _of_two_hosts(note, notes))
+
+
+def _of_two_hosts(note: Note, notes: list[Note]) -> bool:
+    """Tell whether another host's request that nobody answered is the same, within 100 ms before."""
+    return any(
+        other["what"] == "unanswered"
+        and (other["address"], other.get("data_id")) == (note["address"], note.get("data_id"))
+        and other["host"] != note["host"]
+        for other in during(notes, at(note) - ECHOES_S, at(note))
+    )
 
 
 def same_request(note: Note, seconds: float, heard: list[Frame]) -> bool:
