@@ -17,6 +17,8 @@ from dalytools.findings.place import Place
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tests.tools.dalytools.findings.moments import Note
+
 
 def heard(seconds: float, address: int, data_id: int, payload: str = "") -> Frame:
     return Frame(seconds, 13, address, data_id, bytes.fromhex(payload.ljust(16, "0")))
@@ -216,7 +218,10 @@ def test_a_request_that_another_host_repeats_within_100_ms_is_an_echo() -> None:
     both = [heard(1.0, 0x40, 0x93), heard(1.094, 0x40, 0x93)]
     assert explained(counted("echo", 1.094), both, [note], 1.5)
     assert not explained(counted("echo", 1.094), both, [{**note, "why": "silent"}], 1.5)
-    two = [{**note, "why": "silent", "host": "host"}, {**note, "why": "silent", "host": "monitor", "time": 1.094}]
+    two: list[Note] = [
+        {**note, "why": "silent", "host": "host"},
+        {**note, "why": "silent", "host": "monitor", "time": 1.094},
+    ]
     assert explained(counted("echo", 1.094), both, two, 1.5)
     assert not explained(counted("echo", 1.2), [both[0], heard(1.2, 0x40, 0x93)], [note], 1.5)
 
