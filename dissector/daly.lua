@@ -32,6 +32,7 @@ local serial = require("daly_serial")
 local tcp = require("daly_tcp")
 local can = require("daly_can")
 local ble = require("daly_ble")
+local collector = require("daly_collector")
 require("daly_stat").register()
 require("daly_hexlog").register()
 
@@ -126,6 +127,7 @@ local function begin()
   tcp.init(options)
   can.init(options, prefs.can)
   ble.init(options, prefs.ble_handles)
+  collector.init()
 end
 
 local NO_PORTS = 0 -- pinfo.port_type of what is not TCP, UDP or the like

@@ -32,6 +32,8 @@
 
 local M = {}
 
+local collector = require("daly_collector")
+
 local floor = math.floor
 
 -- Parts of an entry. A distance of a link or a table is kept with an offset, for 0 says that there is none; the highest
@@ -41,6 +43,7 @@ local LINK_ZERO, LINK_FAR = 512, 1023
 local TABLE_ZERO, TABLE_FAR = 128, 255
 -- Memory that is kept in `more`, behind the response time; what is below stands for one that many frames share.
 local MEMORY_RARE = 255
+local LOOK = 8192 -- so often the collector is told
 local LONG = 8 -- of strings: longer ones are not shared
 
 --- Columns for a capture.
@@ -51,6 +54,7 @@ function M.new()
     more_count = 0,
     shared = {}, -- memory that many frames have, by number; and the numbers by what they stand for
     number_of = {},
+    next_look = LOOK, -- slot at which the collector is told how long the lists are
     newest = nil, -- slot of the newest reply, its response time and memory: it is shown next
     newest_wait = nil,
     newest_memory = nil,
@@ -130,6 +134,10 @@ function M.note_reply(results, slot, link, wait, memory, table_in)
   results.newest = slot
   results.newest_wait = wait
   results.newest_memory = memory
+  if slot >= results.next_look then
+    results.next_look = slot + LOOK
+    collector.note(slot + results.more_count)
+  end
 end
 
 --- Whether anything is known of a slot.

@@ -4,6 +4,7 @@
 
 package.path = arg[1] .. "/?.lua;" .. package.path
 
+local collector = require("daly_collector")
 local windows = require("daly_windows")
 local foreign = require("daly_foreign")
 local records = require("daly_records")
@@ -37,6 +38,39 @@ same(foreign.name(bytes("0a0b02340d0f"), 1, 6), "Sinowealth", "sino-1")
 same(foreign.name(bytes("dda50300fffd77"), 1, 7), "JBD", "jbd-req")
 same(foreign.name("~20024600800800000000FC22\r", 1, 26), "Pylontech RS485", "pylon")
 same(foreign.name("~20024600800800000000fC22\r", 1, 26), nil, "small letters")
+
+-- The collector's pause: as it was, shorter the longer our lists are, never so short that it does not stop, as it was
+-- again with the next capture; and what another chose meanwhile stays chosen.
+local function pause_now()
+  local now = collectgarbage("setpause", 200)
+  collectgarbage("setpause", now)
+  return now
+end
+collectgarbage("setpause", 240)
+collector.init()
+same(pause_now(), 240, "pause before anything is kept")
+local pauses = {}
+for i, numbers in ipairs({ 1000, 100000, 1000000, 100000000 }) do
+  collector.note(numbers)
+  pauses[i] = pause_now()
+end
+for i = 2, #pauses do
+  same(pauses[i] < pauses[i - 1], true, "shorter with longer lists")
+end
+same(pauses[1] > 220 and pauses[#pauses] > 110 and pauses[#pauses] < 120, true, "an eighth of what lists take")
+collector.note(1000)
+same(pause_now(), pauses[1], "by the lists alone")
+collector.init()
+same(pause_now(), 240, "the next capture")
+collector.note(1000000)
+collectgarbage("setpause", 160)
+collector.note(1000000)
+same(pause_now() < 160 and pause_now() > 100, true, "another's choice is scaled")
+collector.init()
+same(pause_now(), 160, "another's choice stays")
+collector.init()
+same(pause_now(), 160, "and again")
+collectgarbage("setpause", 200)
 
 -- Conservation and independence of chunking, on pseudo-random streams with real beginnings in them.
 local seed = 12345

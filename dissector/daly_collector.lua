@@ -1,0 +1,61 @@
+-- SPDX-License-Identifier: GPL-2.0-or-later
+--
+-- How long Lua's collector waits. By itself it waits until there is twice of what is kept (its pause, 200 %). What we
+-- keep of a capture are long lists of numbers (daly_results), in which it has nothing to follow, but for which it would
+-- wait longer and longer, until what it then takes back has long left the processor's cache. So lists of numbers count
+-- for an eighth, and once it begins it ends sooner (bench/README tells what that is worth):
+--
+--   kept     |<--- the rest --->|<----------- lists of numbers ----------->|
+--   garbage  |<--- as much ---->|<-8th->|
+--
+-- Plugins of one program share one collector: what others keep counts in full, and what they chose is scaled. Pure Lua,
+-- no Wireshark.
+
+local M = {}
+
+local NUMBER = 16 -- bytes, in a list
+local PART = 1 / 8
+local FASTER = 5
+local FASTEST = 1000 -- Lua 5.4 keeps none above 1020
+
+-- What of the collector is set: `ours` is what we made of it, `theirs` what it is without us, in %.
+local pause, pace = { name = "setpause" }, { name = "setstepmul" }
+local rest = 0 -- what was kept when the capture began, bytes
+
+-- In multiples of 4, as Lua 5.4 keeps them. Returns what it was.
+local function set(parameter, value)
+  parameter.ours = 4 * math.floor(value / 4)
+  return collectgarbage(parameter.name, parameter.ours)
+end
+
+-- What it is without us: another plugin may have set it since.
+local function theirs(parameter)
+  local ours = parameter.ours
+  local now = set(parameter, ours or 200)
+  if now ~= ours then
+    parameter.theirs = now
+  end
+  return parameter.theirs
+end
+
+--- A capture begins: what was kept of the one before goes.
+function M.init()
+  for _, parameter in ipairs({ pause, pace }) do
+    if parameter.ours then
+      set(parameter, theirs(parameter))
+      parameter.ours = nil
+    end
+  end
+  collectgarbage()
+  rest = collectgarbage("count") * 1024
+end
+
+--- So many numbers are kept in lists by now.
+function M.note(numbers)
+  local lists = numbers * NUMBER
+  local share = (rest + PART * lists) / (rest + lists)
+  set(pause, 100 + (theirs(pause) - 100) * share)
+  set(pace, math.min(FASTEST, FASTER * theirs(pace)))
+end
+
+return M
