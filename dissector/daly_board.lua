@@ -23,7 +23,8 @@ local contradict, change = results_module.contradict, results_module.change
 M.MOST_CELLS, M.MOST_SENSORS = 48, 21
 local MOST_CELLS, MOST_SENSORS = M.MOST_CELLS, M.MOST_SENSORS
 
-local function board_of(state, address)
+--- What is remembered of a board.
+function M.board_of(state, address)
   local board = state.boards[address]
   if not board then
     board = {}
@@ -31,6 +32,8 @@ local function board_of(state, address)
   end
   return board
 end
+
+local board_of = M.board_of
 
 -- Whether another record (or none) is new enough to say something about the same moment.
 local function is_new(bus, other, starts)
@@ -141,7 +144,10 @@ local function compare_number(bus, slot, name, one, other, count, packet)
   end
 end
 
-local take = {} -- by ID; returns what the frame is shown with, or nil
+--- What reads a reply that is one frame, by ID: read(bus, board, slot, packet, raw, starts, ends) returns what it is
+-- shown with (daly_results), or nil.
+M.readers = {}
+local take = M.readers
 
 take[0x90] = function(bus, board, slot, packet, raw, starts, ends)
   local high, low, _, _, more, less, soc_high, soc_low = byte(raw, 5, 12)
@@ -276,15 +282,6 @@ function M.note_before(bus, slot, address, id)
     local odd = results_module.odd(bus.results, slot)
     odd.was, odd.was_in = was, was_in
   end
-end
-
---- A reply that is one frame. Returns what it is shown with (daly_results), or nil.
-function M.feed(bus, slot, packet, raw, address, id, starts, ends)
-  local known = take[id]
-  if not known then
-    return nil
-  end
-  return known(bus, bus.state.boards[address] or board_of(bus.state, address), slot, packet, raw, starts, ends)
 end
 
 --- A table of all cells (mV) or sensors (raw) of a board with a known count is complete in this packet.

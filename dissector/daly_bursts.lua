@@ -162,6 +162,7 @@ local function begin(state, id, address, base, request)
   burst.base = base
   burst.request = request
   burst.count = count
+  burst.shape = count and shape_of(base, count) -- what its frames are shown with
   burst.per_frame = per_frame
   burst.whole = true -- every frame from the base on was seen
   burst.part_count = 0
@@ -230,7 +231,7 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
   else
     burst.texts[number] = sub(raw, 6, 12)
   end
-  local memory = packed or burst.count and shape_of(burst.base, burst.count) or burst
+  local memory = packed or burst.shape or burst
   if missing or again then
     memory = { burst = M.open(memory), missing = missing, again = again, table = list }
   end

@@ -26,7 +26,8 @@ local soc = require("daly_soc")
 local M = {}
 
 local byte = string.byte
-local note_reply = results_module.note_reply
+local note_reply, answer = results_module.note_reply, exchange.answer
+local readers, board_of = boards.readers, boards.board_of
 local BURST_IDS = bursts.IDS
 local A5 = 0xA5
 
@@ -46,12 +47,58 @@ function M.new(times, results)
   return bus
 end
 
+-- An A5 frame of a host.
+local function feed_request(bus, slot, number, raw, address, id, starts, ends, side)
+  local results = bus.results
+  results.entries[slot] = 0
+  local flag, request = exchange.ask(bus, slot, number, raw, address, id, starts, ends, side)
+  if flag then
+    results.flag[slot] = flag
+    if flag == "echo" then
+      return
+    end
+  end
+  if request.data then
+    boards.note_before(bus, slot, request.board, id)
+  end
+  results.ended[slot] = ends
+  local burst = bus.state.burst
+  if burst and burst.id == id then
+    burst.asked = true
+  end
+end
+
+-- An A5 frame of a board. `length`: of its data.
+local function feed_reply(bus, slot, number, raw, address, id, length, starts, ends, damaged)
+  local state = bus.state
+  if state.only ~= address then
+    soc.note_address(state, address)
+  end
+  if length ~= 8 then -- on CAN: it answers, and says nothing
+    local request, waited = answer(bus, slot, number, raw, address, id, starts)
+    note_reply(bus.results, slot, request, waited)
+  elseif BURST_IDS[id] then
+    local request, waited, shown, values, table_in =
+      bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
+    note_reply(bus.results, slot, request, waited, shown, table_in)
+    if values then
+      boards.feed_table(bus, slot, number, values, address, id, starts, ends)
+    end
+  else
+    if state.burst then
+      bursts.finish(bus)
+    end
+    local request, waited = answer(bus, slot, number, raw, address, id, starts)
+    local read = readers[id]
+    local shown = read and read(bus, board_of(state, address), slot, number, raw, starts, ends)
+    note_reply(bus.results, slot, request, waited, shown)
+  end
+end
+
 --- One frame, A5 or Modbus. `slot`: the frame's own number for the results; `number`: of its packet; `raw`: its bytes;
 -- `starts`, `ends`: s; `side`: tells the two sides of a two-port tap apart, or nil; `owner`: the stream it came from;
 -- `damaged`: the record right before it in that stream is bad_checksum, short or junk.
 function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
-  local first, address, id, length = byte(raw, 1, 4)
-  local results, state = bus.results, bus.state
   local mark = bus.mark
   if mark then
     local log = mark.log
@@ -70,48 +117,34 @@ function M.feed(bus, slot, number, raw, starts, ends, side, owner, damaged)
     end
   end
   -- A clock that steps back does not revive a request.
+  local state = bus.state
   if starts > state.latest then
     state.latest = starts
   end
+  local first, address, id, length = byte(raw, 1, 4)
   if first ~= A5 then
     modbus_board.feed(bus, slot, number, raw, starts, ends, side)
-    return
-  end
-  if address < 0x20 and state.only ~= address then
-    soc.note_address(state, address)
-  end
-  if address >= 0x20 then
-    results.entries[slot] = 0
-    local flag, board, writes = exchange.ask(bus, slot, number, raw, address, id, starts, ends, side)
-    if flag then
-      results.flag[slot] = flag
-    end
-    if writes then
-      boards.note_before(bus, slot, board, id)
-    end
-    if flag ~= "echo" then
-      results.ended[slot] = ends
-      local burst = state.burst
-      if burst and burst.id == id then
-        burst.asked = true
-      end
-    end
-  elseif length ~= 8 then -- on CAN: it answers, and says nothing
-    local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
-    note_reply(results, slot, request, waited)
-  elseif BURST_IDS[id] then
-    local request, waited, shown, values, table_in =
-      bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
-    note_reply(results, slot, request, waited, shown, table_in)
-    if values then
-      boards.feed_table(bus, slot, number, values, address, id, starts, ends)
-    end
+  elseif address >= 0x20 then
+    feed_request(bus, slot, number, raw, address, id, starts, ends, side)
   else
-    if state.burst then
-      bursts.finish(bus)
-    end
-    local request, waited = exchange.answer(bus, slot, number, raw, address, id, starts)
-    note_reply(results, slot, request, waited, boards.feed(bus, slot, number, raw, address, id, starts, ends))
+    feed_reply(bus, slot, number, raw, address, id, length, starts, ends, damaged)
+  end
+end
+
+--- One frame of CAN, in the form of an A5 frame. `slot` and `number`: as above; `shape`: of its identifier
+-- (daly_can_ids); `length`: of its data. Nothing of it is ever taken back.
+function M.feed_can(bus, slot, number, raw, shape, length, time)
+  local results, state = bus.results, bus.state
+  if time > results.latest then
+    results.latest = time
+  end
+  if time > state.latest then
+    state.latest = time
+  end
+  if shape.asks then
+    feed_request(bus, slot, number, raw, shape.source, shape.classic, time, time)
+  else
+    feed_reply(bus, slot, number, raw, shape.source, shape.classic, length, time, time)
   end
 end
 

@@ -9,6 +9,8 @@
 --
 --   frame --identifier--> us? --daly_can_bus--> what it is --view--> tree, columns
 
+local brief = require("daly_brief")
+local bus_module = require("daly_bus")
 local can_bus = require("daly_can_bus")
 local classic = require("daly_can_classic")
 local getters = require("daly_getters")
@@ -21,6 +23,8 @@ local fields = require("daly_fields").fields
 
 local M = {}
 
+local byte = string.byte
+
 -- Called by its name, a method of Wireshark's objects is looked up in C every time.
 local bytes_of, place_of, length_of = Tvb.raw, Tvb.offset, Tvb.reported_len
 local number_of, is_again = getters.attribute("Pinfo", "number"), getters.attribute("Pinfo", "visited")
@@ -29,13 +33,14 @@ local value_of = getters.attribute("FieldInfo", "value")
 local extract = getters.operator("Field", "__call", function(field)
   return field()
 end)
-local out, look, shortly = view.out, view.look, view.shortly
-local raw_of, told = classic.raw, classic.told
-local read, shape_of, shapes = can_bus.read, ids.shape, ids.shapes
+local out, look, briefly = view.out, view.look, brief.show
+local raw_of, key_of, memory = classic.raw, classic.key, classic.memory
+local read, feed_can, shape_of, shapes = can_bus.read, bus_module.feed_can, ids.shape, ids.shapes
 
 -- State of the capture that is open.
 local options
 local state -- as read in order, once
+local results, buses -- its
 local read_to -- number of the newest packet that was read
 local blind -- frames whose interface could not be told (daly_second_look), nil: none
 local usual -- where the frame lies in its packet
@@ -77,6 +82,7 @@ function M.init(with, search)
   options, searching = with, search
   chosen, no_interfaces, refused_number, refused_id = false, false, nil, nil
   state = can_bus.capture(options, chosen)
+  results, buses = state.results, state.buses
   read_to, blind, usual, others, slots = 0, nil, nil, {}, 0
 end
 
@@ -122,17 +128,14 @@ local function show_foreign(_, thing, wanted)
   return "Not Daly: " .. thing.name
 end
 
--- What a frame said when it came before (daly_view.told), or nil.
-local function told_of(id, data)
-  local all = told.entries[id]
-  return all and all[data]
-end
-
 -- Show a classic frame in full, after view.look. `raw`: in the form of an A5 frame.
 local function show_classic(slot, shape, raw, data, remote, buffer, pinfo, parent)
-  local id = shape.id
-  frame.shape, frame.slot, frame.remote, frame.raw, frame.told = shape, slot, remote, raw, told_of(id, data)
-  view.one(parent, buffer, #data, "frame", raw, slot, pinfo, classic.show, frame, told, id, data)
+  frame.shape, frame.slot, frame.remote, frame.raw = shape, slot, remote, raw
+  local key = key_of(shape, data)
+  local kept = view.one(parent, buffer, #data, "frame", raw, slot, pinfo, classic.show, frame, memory, key)
+  if kept then
+    kept.data = data
+  end
 end
 
 -- Show what was found out of a frame, if it is ours. Returns how many bytes were taken.
@@ -149,7 +152,7 @@ local function show(from, slot, shape, data, remote, buffer, pinfo, parent, hand
   frame.shape, frame.slot, frame.remote, frame.length = shape, slot, remote, length
   if found == can_bus.HKMS then
     frame.raw = data
-    view.one(parent, buffer, length, "frame", view.tap and hkms.counted(frame), slot, pinfo, hkms.show, frame)
+    view.one(parent, buffer, length, "frame", view.counts() and hkms.counted(frame), slot, pinfo, hkms.show, frame)
   else
     frame.name = found
     view.one(parent, buffer, length, "foreign", data, slot, pinfo, show_foreign, frame)
@@ -207,9 +210,8 @@ local function note_blind(number)
   second_look.note(blind, number)
 end
 
---- Dissect a CAN frame. `handle`: our protocol's dissector; `id`: pinfo.match_uint. Returns how many bytes were taken,
--- 0: it is not ours.
-function M.dissect(buffer, pinfo, parent, handle, id)
+-- Dissect any frame of CAN: M.dissect.
+local function dissect_any(buffer, pinfo, parent, handle, id)
   local number, place = number_of(pinfo), place_of(buffer)
   usual = usual or place
   local slot, first = number, false
@@ -247,25 +249,6 @@ function M.dissect(buffer, pinfo, parent, handle, id)
   -- Every frame but those of CAN FD has this flag, where there is a tree.
   local flag = extract(is_remote)
   local remote = flag and value_of(flag)
-  if first and flag and not remote and not is_again(pinfo) then -- the usual one
-    local interface = not no_interfaces and extract(interface_id)
-    no_interfaces = not interface
-    local key = interface and value_of(interface) or NO_INTERFACE
-    local entry = told_of(id, data)
-    local raw = read(state, key, slot, number, shape, data, time_of(pinfo), entry and entry[6])
-    if not all_registered and state.known then
-      register_all()
-    end
-    if raw then
-      if not (entry and shortly(parent, handle, state.results, entry, slot, pinfo)) then
-        look(parent, handle, state.results, false, "can")
-        show_classic(slot, shape, raw, data, false, buffer, pinfo, parent)
-      end
-      return length > 0 and length or 1
-    end
-    local taken = show(state, slot, shape, data, false, buffer, pinfo, parent, handle, false)
-    return taken > 0 and taken or refuse(number, id)
-  end
   local from, whole = state, true
   -- Without a tree it was taken for a data frame.
   local seen = flag or fd_flag()
@@ -299,6 +282,50 @@ function M.dissect(buffer, pinfo, parent, handle, id)
   end
   local taken = show(from, slot, shape, data, remote, buffer, pinfo, parent, handle, whole)
   return taken > 0 and taken or refuse(number, id)
+end
+
+--- Dissect a CAN frame. `handle`: our protocol's dissector; `id`: pinfo.match_uint. Returns how many bytes were taken,
+-- 0: it is not ours.
+--
+-- Most frames come for the first time, have eight bytes, and are classic ones on a bus that is known as such: for them
+-- this does what dissect_any does, and nothing that could be left out.
+function M.dissect(buffer, pinfo, parent, handle, id)
+  local number, shape = number_of(pinfo), shapes[id]
+  if not shape or not shape.plain or number <= read_to or place_of(buffer) ~= usual or not (searching or chosen) then
+    return dissect_any(buffer, pinfo, parent, handle, id)
+  end
+  local data, flag = bytes_of(buffer), extract(is_remote)
+  if #data ~= 8 or not flag or value_of(flag) or is_again(pinfo) then
+    return dissect_any(buffer, pinfo, parent, handle, id)
+  end
+  local key = NO_INTERFACE
+  if not no_interfaces then
+    local interface = extract(interface_id)
+    if interface then
+      key = value_of(interface)
+    else
+      no_interfaces = true -- a classic pcap
+    end
+  end
+  local bus = buses[key]
+  if not bus or not bus.classic then
+    return dissect_any(buffer, pinfo, parent, handle, id)
+  end
+  read_to = number
+  local kind = shape.key -- as key_of has it
+  if shape.numbered then
+    kind = kind + byte(data)
+  end
+  local entry = memory.entries[kind]
+  local raw = entry and entry.data == data and entry.raw or raw_of(shape, data)
+  feed_can(bus.daly, number, number, raw, shape, 8, time_of(pinfo))
+  if entry and briefly(parent, handle, results, entry, number, pinfo, raw) then
+    entry.data = data
+  else
+    look(parent, handle, results, false, "can")
+    show_classic(number, shape, raw, data, false, buffer, pinfo, parent)
+  end
+  return 8
 end
 
 return M

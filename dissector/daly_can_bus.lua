@@ -16,7 +16,7 @@ local hkms_bus = require("daly_hkms_bus")
 
 local M = {}
 
-local feed, raw_of = bus_module.feed, classic.raw
+local feed_can, raw_of = bus_module.feed_can, classic.raw
 
 local AMBIGUOUS = "HKMS or Deye"
 local NOTHING = ("\0"):rep(8)
@@ -84,8 +84,8 @@ local function kind_of(bus, shape, data)
 end
 
 --- One frame, in the order of the capture, once: its `shape` (daly_can_ids), `data` (at most eight bytes), `time` in s.
--- Returns a classic frame in the form of an A5 frame (`raw`, where that is at hand).
-function M.read(state, key, slot, number, shape, data, time, raw)
+-- Returns a classic frame in the form of an A5 frame.
+function M.read(state, key, slot, number, shape, data, time)
   local bus = state.buses[key] or bus_of(state, key)
   local kind
   if not shape.sure then
@@ -95,16 +95,17 @@ function M.read(state, key, slot, number, shape, data, time, raw)
     end
   end
   state.known = true
+  if not kind or kind == "classic" then
+    bus.classic = true
+    local raw = raw_of(shape, data)
+    feed_can(bus.daly, slot, number, raw, shape, #data, time)
+    return raw
+  end
   local results = state.results
   if time > results.latest then
     results.latest = time
   end
-  if not kind or kind == "classic" then
-    bus.classic = true
-    raw = raw or raw_of(shape, data)
-    feed(bus.daly, slot, number, raw, time, time)
-    return raw
-  elseif kind == "hkms" then
+  if kind == "hkms" then
     state.found[slot] = M.HKMS
     hkms_bus.feed(bus.hkms, slot, number, shape, data, time)
   else

@@ -4,6 +4,7 @@
 --
 --   18 | data ID | destination | source       d0 d1 d2 d3 d4 d5 d6 d7
 
+local brief = require("daly_brief")
 local fields = require("daly_fields").fields
 local view = require("daly_view")
 
@@ -50,6 +51,22 @@ function M.show_head(shape, length, remote)
   end
 end
 
+--- What classic frames said (daly_brief); `key`: M.key.
+M.memory = brief.memory()
+
+--- The place of a frame's kind in that memory.
+function M.key(shape, data)
+  local length = #data
+  if length ~= 8 then
+    return -(shape.id * 256 + length)
+  end
+  local key = shape.key
+  if shape.numbered then
+    return key + byte(data)
+  end
+  return key
+end
+
 -- The frame at hand.
 local shape, remote
 
@@ -73,9 +90,6 @@ local function names(raw)
   return beginnings[id], sources[id], destinations[id]
 end
 
---- What classic frames said (daly_view.shortly): by identifier and bytes.
-M.told = view.told()
-
 local carrier = { names = names }
 
 function carrier.board()
@@ -88,9 +102,9 @@ function carrier.show(raw)
   M.show_head(shape, byte(raw, 4), remote)
 end
 
---- For daly_view.one. `frame`: { raw = as_a5, shape =, slot =, remote =, told = what it told when it came before }.
+--- For daly_view.one. `frame`: { raw = as_a5, shape =, slot =, remote = }.
 function M.show(item, frame)
-  shape, remote, carrier.told = frame.shape, frame.remote, frame.told
+  shape, remote = frame.shape, frame.remote
   return view.a5_on(item, frame.raw, frame.slot, carrier)
 end
 

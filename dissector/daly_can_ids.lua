@@ -7,6 +7,8 @@
 --
 -- One of destination and source is a board, 01..10, the other a host: 20, 40..4F, 80.
 
+local NUMBERED = require("daly_bursts").IDS
+
 local M = {}
 
 local floor, format, concat = math.floor, string.format, table.concat
@@ -65,6 +67,7 @@ local function shape(id)
   local asks = is_board(destination) and is_host(source)
   local found = {
     id = id,
+    key = id * 256,
     priority = priority,
     destination = destination,
     source = source,
@@ -76,8 +79,10 @@ local function shape(id)
   if priority == CLASSIC and (asks or is_board(source) and is_host(destination)) and not DEYE_SETTINGS[middle] then
     found.classic = middle
     found.sure = middle >= FIRST_READ and middle <= LAST_READ
+    found.numbered = not asks and NUMBERED[middle] ~= nil
   end
   found.writes = WRITES[register] and asks or nil
+  found.plain = found.classic and not found.writes
   found.streamed = register >= FIRST_STREAMED and register <= LAST_STREAMED and is_board(source) or nil
   found.keep_alive = id == M.KEEP_ALIVE or nil
   return found
@@ -91,8 +96,10 @@ local shapes, count = {}, 0
 M.shapes = shapes
 
 --- What an identifier can be: { id =, priority =, destination =, source =, register =, board = the one that is asked or
--- speaks, asks = whether a host asks a board, classic = data ID, sure = whether that ID tells Daly from others, writes
--- =, streamed =, keep_alive = of HKMS, foreign = name }, each nil or false where it is not.
+-- speaks, asks = whether a host asks a board, classic = data ID, sure = whether that ID tells Daly from others, plain =
+-- whether it is classic on any bus of Daly's, numbered = whether such replies are frames of bursts, key = what its
+-- frames are remembered by (daly_can_classic), writes =, streamed =, keep_alive = of HKMS, foreign = name }, each nil
+-- or false where it is not.
 function M.shape(id)
   local found = shapes[id]
   if not found then

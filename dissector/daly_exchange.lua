@@ -82,7 +82,8 @@ end
 
 local remember = M.remember
 
---- A request. Returns "echo", "retry" or nil; and, of one that writes, the board it names (or nil) and true.
+--- A request. Returns "echo", "retry" or nil; and what is remembered of it, if it is no echo: { board = the one it
+-- names, or nil, data = the eight bytes that it writes, or nil, ... }.
 function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
   local state, times = bus.state, bus.times
   local flag, request
@@ -90,7 +91,6 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
   if before and before.over then
     -- The same bytes again, and nothing else knows the request before: its table serves again, which is half the work.
     request = before
-    request.answered = false
     request.over = false
     request.echoed = false
     request.slot = slot
@@ -124,7 +124,7 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
       others = not bus.can and (address <= 0x40 or address > 0x4F), -- any board's reply will do
       data = is_write(id) and byte(raw, 4) == 8 and sub(raw, 5, 12) or nil,
       answered = false,
-      over = false, -- it is answered and in no list
+      over = false, -- it is answered (which `answered` does not say) and in no list
       echoed = false,
     }
     if not before then
@@ -135,7 +135,14 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     end
     state.last[raw] = request
   end
-  remember(state, id, request, times.late)
+  local list = state.asked[id]
+  if list and list.first > list.last then -- what M.remember does, where nobody else waits
+    local last = list.last + 1
+    list[last] = request
+    list.last = last
+  else
+    remember(state, id, request, times.late)
+  end
   local host, other = request.host, state.host
   if host ~= other then
     if other and starts - state.host_ended <= times.reply + GRACE then
@@ -145,7 +152,7 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     state.any = true
   end
   state.host_ended = ends
-  return flag, request.board, request.data ~= nil
+  return flag, request
 end
 
 -- What the reply to a write says of it.
@@ -191,11 +198,12 @@ function M.answer(bus, slot, number, raw, address, id, starts)
           missed = request
         end
       elseif fits then
-        request.answered = true
         if i == list.last then
           list[i] = nil
           list.last = i - 1
           request.over = true
+        else
+          request.answered = true
         end
         answered(bus, request.slot, number)
         if board ~= address and board and address >= 0x01 and address <= 0x10 then

@@ -60,7 +60,11 @@ end
 
 -- The burst that a 0x95, 0x96 or text frame belongs to, and what was odd about the frame.
 local function burst_of(frame)
-  return bursts.open(frame.memory)
+  local memory = frame.memory
+  if type(memory) == "table" and memory.shared then -- most of them
+    return memory, nil
+  end
+  return bursts.open(memory)
 end
 
 -- 0x90: voltage.2 gather.2 current.2 soc.2

@@ -45,7 +45,7 @@ local function listen(report, filter, draw)
   local listener = Listener.new("frame", filter ~= "" and filter or nil)
   local counted = report.make()
   local captures = {} -- results of the records that were counted
-  view.tap = collect
+  view.count(collect)
   function listener.packet(pinfo)
     if shown_of ~= pinfo.number then
       return

@@ -8,6 +8,7 @@ local payload = require("daly_payload")
 local bursts = require("daly_bursts")
 local exchange = require("daly_exchange")
 local addresses = require("daly_addresses")
+local brief = require("daly_brief")
 local getters = require("daly_getters")
 local data_ids = require("daly_data_ids")
 local foreign = require("daly_foreign")
@@ -28,10 +29,8 @@ local byte, format, concat = string.byte, string.format, table.concat
 local add, add_le, referenced = TreeItem.add, TreeItem.add_le, TreeItem.referenced
 local append_text, set_text, set_generated = TreeItem.append_text, TreeItem.set_text, TreeItem.set_generated
 local range = Tvb.range
-local columns_of, is_visible = getters.attribute("Pinfo", "cols"), getters.attribute("TreeItem", "visible")
-local set_column = getters.operator("Columns", "__newindex", function(columns, name, text)
-  columns[name] = text
-end)
+local is_visible = getters.attribute("TreeItem", "visible")
+local set_columns = brief.set_columns
 
 local packet_comment = Field.new("frame.comment")
 
@@ -52,27 +51,35 @@ end
 -- and whether somebody looks at the tree; whether the capture was read to its end; the medium.
 local daly, results, wanted, visible, again, transport
 
---- Where somebody counts (daly_stat): called for each record that is shown with the packet's number, the record's kind,
--- bytes and slot, the list of all cells or sensors that it carries (or false), and the results that its slot is of.
-M.tap = nil
+-- Where somebody counts (M.count), or nil.
+local tap
 
 -- Replies that took longer get a note, s.
 local slow = 0.5
 
--- What frames said (see M.told), for each carrier.
-local memories = {}
-
 --- Once: the protocol, which the items of the tree belong to.
 function M.setup(proto)
   daly = proto
+  brief.setup(proto)
 end
 
 --- What a slow reply is, s.
 function M.init(options)
   slow = options.slow
-  for i = 1, #memories do
-    memories[i].entries, memories[i].count = {}, 0
-  end
+  brief.init()
+end
+
+--- Somebody counts from now on (daly_stat): `collect` is called for each record that is shown with the packet's number,
+-- the record's kind, bytes and slot, the list of all cells or sensors that it carries (or false), and the results that
+-- its slot is of.
+function M.count(collect)
+  tap = collect
+  brief.stop()
+end
+
+--- Whether somebody counts.
+function M.counts()
+  return tap ~= nil
 end
 
 --- Before a packet is shown. `handle`: the protocol's dissector; `known`: results of daly_bus; `read`: whether the
@@ -280,8 +287,7 @@ end
 local frame = {} -- the one at hand, for daly_payload
 
 -- How another carrier of the eight bytes than an A5 frame looks: { names = function(raw): words, source and
--- destination, board = function(raw), show = function(raw): fields of its head, told = what it told when it came before
--- (an entry of M.told), or nil }. nil: an A5 frame.
+-- destination, board = function(raw), show = function(raw): fields of its head }. nil: an A5 frame.
 local carrier
 
 -- What a frame's rare things say (daly_results' odd): expert notes.
@@ -347,54 +353,34 @@ local function show_odd(odd)
   end
 end
 
--- What frames said, by their bytes: they come again and again. Not more than so many; those of each carrier apart, for
--- they say it otherwise. An entry:
---
---   { memory, words, source, destination, longest }
---
--- `memory`: what it was shown with (daly_results); `longest`: how long it may have waited for nothing to be noted, s.
-local MOST_TOLD = 4096
+-- What A5 frames of a serial line and of Bluetooth said, by key_of, and what Modbus frames said, by their bytes.
+local a5_memory, modbus_memory = brief.memory(), brief.memory()
 
---- A memory of what frames said, for a carrier.
-function M.told()
-  local told = { entries = {}, count = 0 }
-  memories[#memories + 1] = told
-  return told
-end
+-- What is remembered of the kind of the frame at hand (daly_brief), or nil; how a reply's words begin, and what makes
+-- the rest of them.
+local entry
+local beginning, say
 
-local own_told = M.told()
-
--- The words of a reply that was told before with the same memory, or nil.
-local function told_before(raw, memory)
-  local entry
-  if carrier then
-    entry = carrier.told
-  else
-    entry = own_told.entries[raw]
-  end
-  return entry and entry[1] == (memory or false) and entry[2] or nil
-end
-
--- Remember what a frame said, where bytes and memory make it say the same again; by `key`, in the entries of `group`
--- where there is one.
-local function keep_told(told, group, key, raw, slot, text, source, destination)
+-- Remember what the frame at hand said, where bytes and memory make it say the same again. Returns its entry, or nil.
+local function keep(memory, key, raw, slot, text, source, destination)
   if again or results.odd[slot] or results.flag[slot] then
-    return
+    return nil
   end
-  local memory = memory_of(results, slot) or false
-  if type(memory) == "table" and not memory.shared then
-    return
+  local shown_with = memory_of(results, slot) or false
+  if type(shown_with) == "table" and not shown_with.shared then
+    return nil
   end
-  if told.count >= MOST_TOLD then
-    told.entries, told.count = {}, 0
-  end
-  local entries = told.entries
-  if group then
-    entries[group] = entries[group] or {}
-    entries = entries[group]
-  end
-  entries[key] = { memory, text, source, destination, noted and -math.huge or slow, raw }
-  told.count = told.count + 1
+  local kept = brief.entry(memory, key)
+  kept.raw = raw
+  kept.memory = shown_with
+  kept.words = text
+  kept.source = source
+  kept.destination = destination
+  kept.longest = noted and -math.huge or slow
+  kept.beginning = beginning
+  kept.say = say
+  kept.numbered = say and bursts.IDS[byte(raw, 3)] ~= nil
+  return kept
 end
 
 -- A request (echo, retry): expert notes and fields of its own; returns its words.
@@ -457,11 +443,13 @@ local function reply(item, raw, slot, id, length, odd, text)
   if numbered then
     frame.table, frame.text = payload.whole(slot, memory, again)
   end
-  local before = told_before(raw, memory)
-  if before then
-    text = before
+  local words = whole and payload.words[id]
+  if words and id ~= 0x98 then
+    beginning, say = text, words
+  end
+  if entry and entry.raw == raw and entry.memory == (memory or false) then
+    text = entry.words
   else
-    local words = whole and payload.words[id]
     text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
   end
   if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
@@ -620,6 +608,7 @@ local function begin(parent, buffer, offset, length, kind)
 end
 
 local function one_record(parent, buffer, raw, item, pinfo)
+  entry = nil
   local kind = item.kind
   local offset, length = item.at, item.length
   if item.bytes then
@@ -648,8 +637,8 @@ local function one_record(parent, buffer, raw, item, pinfo)
   if item.name == foreign.MODBUS and transport == "uart" then
     mbrtu.show(parent, buffer, offset, raw, pinfo)
   end
-  if M.tap then
-    M.tap(pinfo.number, kind, raw, item.slot, kind == "frame" and item.dialect == "a5" and frame.table, results)
+  if tap then
+    tap(pinfo.number, kind, raw, item.slot, kind == "frame" and item.dialect == "a5" and frame.table, results)
   end
   return text, source, destination
 end
@@ -665,17 +654,6 @@ local function one_part(parent, buffer, item)
     node:append_text(format(", %d bytes of a record that ends in packet %d", item.length, item.part))
   end
   return format("%d bytes, continued in #%d", item.length, item.part)
-end
-
--- The columns, of a packet that is one record.
-local function set_columns(pinfo, text, source, destination)
-  local columns = columns_of(pinfo)
-  set_column(columns, "protocol", "Daly")
-  set_column(columns, "info", text)
-  if source then
-    set_column(columns, "src", source)
-    set_column(columns, "dst", destination)
-  end
 end
 
 -- Info column: all records of a packet, within reason.
@@ -712,55 +690,24 @@ function M.several(parent, buffer, raw, items, pinfo)
   end
 end
 
---- Show a whole frame, which was read right before, as it was shown when it came before (M.told), where nobody looks
--- closer. Returns whether that was enough; else it is to be shown in full. `known`: results of its bus.
-local function shortly(parent, handle, known, entry, slot, pinfo)
-  local memory, wait = false, 0
-  if slot == known.newest then
-    memory = known.newest_memory or false
-    wait = known.newest_wait or 0
-  elseif known.entries[slot] ~= 0 then
-    return false -- it is no request either
-  end
-  if
-    entry[1] ~= memory
-    or wait > entry[5]
-    or known.odd[slot]
-    or known.flag[slot]
-    or M.tap
-    or referenced(parent, handle)
-  then
-    return false
-  end
-  add(parent, daly)
-  local columns = columns_of(pinfo)
-  set_column(columns, "protocol", "Daly")
-  set_column(columns, "info", entry[2])
-  set_column(columns, "src", entry[3])
-  set_column(columns, "dst", entry[4])
-  return true
-end
-
-M.shortly = shortly
-
 --- A packet that is one record of `kind`, whose `length` bytes stand at the buffer's beginning. `show(item, thing,
 -- wanted)` adds its fields (M.out, whose data byte 0 is the buffer's first byte) and returns words, source,
--- destination; `raw` and `slot`: for daly_stat; `told`: memory for M.shortly, or nil; `group`, `key`: its place there.
-function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing, told, group, key)
+-- destination; `raw` and `slot`: for daly_stat; `memory`: of daly_brief, for an A5 frame, or nil; `key`: its place
+-- there. Returns its new entry, or nil.
+function M.one(parent, buffer, length, kind, raw, slot, pinfo, show, thing, memory, key)
   local node = begin(parent, buffer, 0, length, kind)
-  at, noted = -4, false
+  at, noted, entry, beginning, say = -4, false, memory and memory.entries[key], nil, nil
   frame.table = nil
   local text, source, destination = show(node, thing, wanted)
-  if told then
-    keep_told(told, group, key, raw, slot, text, source, destination)
-  end
+  local kept = memory and keep(memory, key, raw, slot, text, source, destination)
   set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
   end
-  if M.tap then
-    M.tap(pinfo.number, kind, raw, slot, frame.table, results)
+  if tap then
+    tap(pinfo.number, kind, raw, slot, frame.table, results)
   end
+  return kept
 end
 
 --- Show a frame with another carrier (above) by what it means: for M.one. `raw`: in the form of an A5 frame (daly_bus).
@@ -773,28 +720,40 @@ end
 
 M.out, M.hex_words, M.id_words, M.host_name, M.reply_words = out, hex_words, id_words, host_name, reply_words
 
+-- The place of an A5 frame's kind in a memory of daly_brief.
+local function key_of(raw)
+  local _, address, id, _, number = byte(raw, 1, 5)
+  local key = (address * 256 + id) * 256
+  return bursts.IDS[id] and address < 0x20 and key + number or key
+end
+
 --- A packet that is one whole frame, which is the usual one. `handle`, `known`, `read`, `medium`: as for M.look.
 function M.whole(parent, handle, known, read, medium, buffer, raw, slot, pinfo)
-  local entry = not read and own_told.entries[raw]
-  if entry and shortly(parent, handle, known, entry, slot, pinfo) then
+  local is_a5 = byte(raw) == A5
+  local memory, key = modbus_memory, raw
+  if is_a5 then
+    memory, key = a5_memory, key_of(raw)
+  end
+  entry = memory.entries[key]
+  if entry and not read and brief.show(parent, handle, known, entry, slot, pinfo, raw) then
     return
   end
   look(parent, handle, known, read, medium)
   local node = begin(parent, buffer, 0, #raw, "frame")
-  frame.table, noted = nil, false
+  frame.table, noted, beginning, say = nil, false, nil, nil
   local text, source, destination
-  if byte(raw) == A5 then
+  if is_a5 then
     text, source, destination = a5(node, raw, slot)
   else
     text, source, destination = modbus(node, raw, slot)
   end
-  keep_told(own_told, nil, raw, raw, slot, text, source, destination)
+  keep(memory, key, raw, slot, text, source, destination)
   set_columns(pinfo, text, source, destination)
   if visible then
     node:append_text(", " .. text)
   end
-  if M.tap then
-    M.tap(pinfo.number, "frame", raw, slot, frame.table, results)
+  if tap then
+    tap(pinfo.number, "frame", raw, slot, frame.table, results)
   end
 end
 

@@ -161,7 +161,7 @@ ERRORS = {
         Difference(4, "bytes before", "2233", "112233"),
     ),
     "a response time half a second off": (
-        (r"request, waited, boards\.feed", "request, 0.5, boards.feed"),
+        (r"request, waited, shown\)", "request, 0.5, shown)"),
         "made",
         Difference(2, "daly.response_time", "0.5", "0.001"),
     ),
