@@ -65,7 +65,8 @@ function M.entry(memory, key)
     if memory.count >= MOST then
       memory.entries, memory.count = {}, 0
     end
-    entry = {}
+    -- Made in one go: of Modbus each frame with other bytes has one.
+    entry = { raw = false, memory = false, words = false, source = false, destination = false, longest = 0 }
     memory.entries[key] = entry
     memory.count = memory.count + 1
   end
