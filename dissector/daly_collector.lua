@@ -22,17 +22,16 @@ local FASTEST = 1000 -- Lua 5.4 keeps none above 1020
 local pause, pace = { name = "setpause" }, { name = "setstepmul" }
 local rest = 0 -- what was kept when the capture began, bytes
 
--- In multiples of 4, as Lua 5.4 keeps them. Returns what it was.
+-- In multiples of 4, as Lua 5.4 keeps them.
 local function set(parameter, value)
   parameter.ours = 4 * math.floor(value / 4)
-  return collectgarbage(parameter.name, parameter.ours)
+  collectgarbage(parameter.name, parameter.ours)
 end
 
--- What it is without us: another plugin may have set it since.
+-- What it is without us: another plugin may have set it since. To be followed by setting it, for it is read so.
 local function theirs(parameter)
-  local ours = parameter.ours
-  local now = set(parameter, ours or 200)
-  if now ~= ours then
+  local now = collectgarbage(parameter.name, parameter.ours or 200)
+  if now ~= parameter.ours then
     parameter.theirs = now
   end
   return parameter.theirs
@@ -42,7 +41,7 @@ end
 function M.init()
   for _, parameter in ipairs({ pause, pace }) do
     if parameter.ours then
-      set(parameter, theirs(parameter))
+      collectgarbage(parameter.name, theirs(parameter))
       parameter.ours = nil
     end
   end
@@ -54,8 +53,9 @@ end
 function M.note(numbers)
   local lists = numbers * NUMBER
   local share = (rest + PART * lists) / (rest + lists)
-  set(pause, 100 + (theirs(pause) - 100) * share)
-  set(pace, math.min(FASTEST, FASTER * theirs(pace)))
+  local wait, speed = theirs(pause), theirs(pace)
+  set(pause, wait > 100 and 100 + (wait - 100) * share or wait)
+  set(pace, math.max(speed, math.min(FASTEST, FASTER * speed)))
 end
 
 return M

@@ -43,7 +43,7 @@ local LINK_ZERO, LINK_FAR = 512, 1023
 local TABLE_ZERO, TABLE_FAR = 128, 255
 -- Memory that is kept in `more`, behind the response time; what is below stands for one that many frames share.
 local MEMORY_RARE = 255
-local LOOK = 8192 -- so often the collector is told
+local LOOK = 4096 -- so often the collector is told
 local LONG = 8 -- of strings: longer ones are not shared
 
 --- Columns for a capture.
@@ -54,7 +54,8 @@ function M.new()
     more_count = 0,
     shared = {}, -- memory that many frames have, by number; and the numbers by what they stand for
     number_of = {},
-    next_look = LOOK, -- slot at which the collector is told how long the lists are
+    replies = 0, -- so many were noted, and at how many the collector is told how long the lists are
+    next_look = LOOK,
     newest = nil, -- slot of the newest reply, its response time and memory: it is shown next
     newest_wait = nil,
     newest_memory = nil,
@@ -134,9 +135,11 @@ function M.note_reply(results, slot, link, wait, memory, table_in)
   results.newest = slot
   results.newest_wait = wait
   results.newest_memory = memory
-  if slot >= results.next_look then
-    results.next_look = slot + LOOK
-    collector.note(slot + results.more_count)
+  local replies = results.replies + 1
+  results.replies = replies
+  if replies == results.next_look then
+    results.next_look = replies + LOOK
+    collector.note(2 * replies + results.more_count) -- there are about as many requests
   end
 end
 

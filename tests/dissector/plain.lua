@@ -70,7 +70,44 @@ collector.init()
 same(pause_now(), 160, "another's choice stays")
 collector.init()
 same(pause_now(), 160, "and again")
+for _, chosen in ipairs({ 203, 150, 100, 60 }) do
+  collectgarbage("setpause", chosen)
+  local before = pause_now()
+  collector.note(1000000)
+  same(pause_now() <= before, true, "never lazier")
+  collector.init()
+  same(pause_now(), before, "given back as it was")
+end
 collectgarbage("setpause", 200)
+local function pace_now()
+  local now = collectgarbage("setstepmul", 200)
+  collectgarbage("setstepmul", now)
+  return now
+end
+for _, chosen in ipairs({ 100, 203, 1000, 2000 }) do
+  collectgarbage("setstepmul", chosen)
+  local before = pace_now()
+  collector.note(1000000)
+  same(pace_now() >= before, true, "never slower")
+  collector.init()
+  same(pace_now(), before, "given back as it was")
+end
+collectgarbage("setstepmul", 200)
+
+-- It is told of what is kept, however far apart the frames are.
+local results = require("daly_results")
+local sparse, dense = results.new(), results.new()
+collector.init()
+for i = 1, 5000 do
+  results.note_reply(dense, 2 * i, 2 * i - 1, 0.1)
+end
+local for_dense = pause_now()
+collector.init()
+for i = 1, 5000 do
+  results.note_reply(sparse, 1000 * i, 1000 * i - 1, 0.1)
+end
+same(for_dense < 200 and pause_now() >= for_dense, true, "sparse frames")
+collector.init()
 
 -- Conservation and independence of chunking, on pseudo-random streams with real beginnings in them.
 local seed = 12345
