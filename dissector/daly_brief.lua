@@ -121,7 +121,7 @@ function M.show(parent, handle, known, entry, slot, pinfo, raw)
     end
   end
   add(parent, daly)
-  local columns = columns_of(pinfo)
+  local columns = columns_of(pinfo) -- what M.set_columns does: most frames come by here
   set_column(columns, "protocol", "Daly")
   set_column(columns, "info", words)
   set_column(columns, "src", entry.source)

@@ -8,8 +8,8 @@
 --   kept     |<--- the rest --->|<----------- lists of numbers ----------->|
 --   garbage  |<--- as much ---->|<-8th->|
 --
--- Plugins of one program share one collector: what others keep counts in full, and what they chose is scaled. Pure Lua,
--- no Wireshark.
+-- Plugins of one program share one collector: what others keep (as it was when the capture began) counts in full, and
+-- what they chose is scaled. Pure Lua, no Wireshark.
 
 local M = {}
 

@@ -641,6 +641,9 @@ function M.severe(data)
   return "Level 2 fault: " .. concat(level_2, ", ")
 end
 
+--- IDs whose bytes by themselves bring notes (M.complaints): each such frame is to be looked at closer.
+M.COMPLAINS = { [0x98] = true }
+
 --- What is to be said of a reply's content: a list of { expert's name, words }.
 function M.complaints(id, frame)
   local list = {}

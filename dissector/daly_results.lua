@@ -54,8 +54,8 @@ function M.new()
     more_count = 0,
     shared = {}, -- memory that many frames have, by number; and the numbers by what they stand for
     number_of = {},
-    replies = 0, -- so many were noted, and at how many the collector is told how long the lists are
-    next_look = LOOK,
+    replies = 0, -- so many were noted
+    next_look = LOOK, -- at so many the collector is told how long the lists are
     newest = nil, -- slot of the newest reply, its response time and memory: it is shown next
     newest_wait = nil,
     newest_memory = nil,

@@ -444,7 +444,7 @@ local function reply(item, raw, slot, id, length, odd, text)
     frame.table, frame.text = payload.whole(slot, memory, again)
   end
   local words = whole and payload.words[id]
-  if words and id ~= 0x98 then
+  if words and not payload.COMPLAINS[id] then
     beginning, say = text, words
   end
   if entry and entry.raw == raw and entry.memory == (memory or false) then
@@ -452,7 +452,7 @@ local function reply(item, raw, slot, id, length, odd, text)
   else
     text = text .. (words and words(frame) or hex_words(raw, 5, 4 + length))
   end
-  if whole and id == 0x98 or (type(memory) == "table" and memory.burst) then
+  if whole and payload.COMPLAINS[id] or (type(memory) == "table" and memory.burst) then
     local complaints = payload.complaints(id, frame)
     for i = 1, #complaints do
       note(item, experts[complaints[i][1]], complaints[i][2])
