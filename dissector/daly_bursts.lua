@@ -112,14 +112,13 @@ function M.falls_short(burst)
   return burst.count and burst.per_frame * (burst.number - burst.base + 1) < burst.count
 end
 
---- The running burst of a bus is over.
-function M.finish(bus)
-  local state = bus.state
-  local burst = state.burst
+--- The running burst of a lane is over.
+function M.finish(bus, lane)
+  local burst = lane.burst
   if burst then
-    state.burst = nil
+    lane.burst = nil
     if burst.count then
-      state.old_burst = burst
+      lane.old_burst = burst
     end
     if M.falls_short(burst) then
       local odd = bus.results.odd[burst.last]
@@ -142,13 +141,13 @@ local function link_parts(bus, burst, number)
 end
 
 -- A burst begins. One whose count is known uses the tables of such a one before, which nobody else has.
-local function begin(state, id, address, base, request)
+local function begin(state, lane, id, address, base, request)
   local board = state.boards[address]
   local count = board and (id == 0x95 and board.cells or id == 0x96 and board.sensors) or nil
   local per_frame = PER_FRAME[id]
-  local burst = count and state.old_burst
+  local burst = count and lane.old_burst
   if burst then
-    state.old_burst = nil
+    lane.old_burst = nil
   else
     burst = {
       pieces = count and {} or nil, -- where the count is known: data bytes of its frames
@@ -170,13 +169,44 @@ local function begin(state, id, address, base, request)
   return burst
 end
 
---- A reply that is one of several frames. `damaged`: what stands right before it in its stream is. Returns, each nil
+--- What the bursts of a reply run in, { burst = the running one, old_burst = one that is over, whose table serves
+-- again }: of a serial line its bus's state; on CAN, where boards and hosts are told apart, one for each two of them.
+function M.lane(bus, raw, address)
+  local state = bus.state
+  if not bus.can then
+    return state
+  end
+  local key = address * 256 + exchange.host(byte(raw, 13))
+  local lane = state.lanes[key]
+  if not lane then
+    lane = { address = address }
+    state.lanes[key] = lane
+  end
+  return lane
+end
+
+--- A request that one board (of a serial line any) may answer: the same number again begins a new burst.
+function M.asked(bus, id, board)
+  local state = bus.state
+  local burst = state.burst
+  if burst and burst.id == id then
+    burst.asked = true
+  end
+  for _, lane in pairs(state.lanes) do
+    burst = lane.burst
+    if burst and burst.id == id and lane.address == board then
+      burst.asked = true
+    end
+  end
+end
+
+--- A reply that is one of several frames, in its lane. `damaged`: what stands right before it in its stream is. Returns, each nil
 -- where there is none: packet of its request; response time; what it is shown with; the table; packet of the burst's
 -- table, where that came before.
-function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
+function M.feed(bus, lane, slot, packet, raw, address, id, starts, ends, damaged)
   local state = bus.state
   local number = byte(raw, 5)
-  local burst = state.burst
+  local burst = lane.burst
   local highest = IDS[id]
   if number > highest then
     return nil -- FF, or more than the paper's 48 cells, 21 sensors: skipped
@@ -203,11 +233,11 @@ function M.feed(bus, slot, packet, raw, address, id, starts, ends, damaged)
       end
       base = 0 -- number 0 may be what was damaged
     end
-    M.finish(bus)
+    M.finish(bus, lane)
     local request
     request, wait = exchange.answer(bus, slot, packet, raw, address, id, starts)
-    burst = begin(state, id, address, base, request)
-    state.burst = burst
+    burst = begin(state, lane, id, address, base, request)
+    lane.burst = burst
     from = base
   end
   if number > from then
@@ -273,6 +303,15 @@ function M.whole_in(results, slot, again)
   return nil
 end
 
+-- Whether a frame is the last of a running burst, which has ended by time, before its last cell or sensor.
+local function ran_out(results, bus, lane, slot)
+  local burst = lane.burst
+  return burst
+    and burst.last == slot
+    and M.falls_short(burst)
+    and results.latest - burst.ended > bus.times.burst + GRACE
+end
+
 --- Whether a frame is the last of a burst that was cut off: it ended and its last cell or sensor was not reached.
 function M.is_cut_off(results, slot)
   local odd = results.odd[slot]
@@ -281,9 +320,13 @@ function M.is_cut_off(results, slot)
   end
   for i = 1, #results.buses do
     local bus = results.buses[i]
-    local burst = bus.state.burst
-    if burst and burst.last == slot then
-      return M.falls_short(burst) and results.latest - burst.ended > bus.times.burst + GRACE or false
+    if ran_out(results, bus, bus.state, slot) then
+      return true
+    end
+    for _, lane in pairs(bus.state.lanes) do
+      if ran_out(results, bus, lane, slot) then
+        return true
+      end
     end
   end
   return false

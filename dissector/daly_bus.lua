@@ -28,7 +28,7 @@ local M = {}
 local byte = string.byte
 local note_reply, answer = results_module.note_reply, exchange.answer
 local readers, board_of = boards.readers, boards.board_of
-local BURST_IDS = bursts.IDS
+local BURST_IDS, lane_of = bursts.IDS, bursts.lane
 local A5 = 0xA5
 
 -- So many frames of others are remembered while one stream's last frame is uncertain; then it counts as certain.
@@ -39,8 +39,7 @@ local MOST_UNCERTAIN = 500
 function M.new(times, results)
   local state = exchange.state()
   state.boards = {} -- by address byte of replies
-  state.burst = nil -- the running one
-  state.old_burst = nil -- one that is over, whose table serves again
+  state.lanes = {} -- what bursts run in, on CAN (daly_bursts.lane)
   state.from_zero = {} -- by data ID x 256 + address byte: a reply had number 0
   local bus = { times = times, results = results, state = state, mark = nil }
   results.buses[#results.buses + 1] = bus
@@ -62,9 +61,8 @@ local function feed_request(bus, slot, number, raw, address, id, starts, ends, s
     boards.note_before(bus, slot, request.board, id)
   end
   results.ended[slot] = ends
-  local burst = bus.state.burst
-  if burst and burst.id == id then
-    burst.asked = true
+  if BURST_IDS[id] then
+    bursts.asked(bus, id, request.board)
   end
 end
 
@@ -79,14 +77,15 @@ local function feed_reply(bus, slot, number, raw, address, id, length, starts, e
     note_reply(bus.results, slot, request, waited)
   elseif BURST_IDS[id] then
     local request, waited, shown, values, table_in =
-      bursts.feed(bus, slot, number, raw, address, id, starts, ends, damaged)
+      bursts.feed(bus, lane_of(bus, raw, address), slot, number, raw, address, id, starts, ends, damaged)
     note_reply(bus.results, slot, request, waited, shown, table_in)
     if values then
       boards.feed_table(bus, slot, number, values, address, id, starts, ends)
     end
   else
-    if state.burst then
-      bursts.finish(bus)
+    local lane = lane_of(bus, raw, address)
+    if lane.burst then
+      bursts.finish(bus, lane)
     end
     local request, waited = answer(bus, slot, number, raw, address, id, starts)
     local read = readers[id]

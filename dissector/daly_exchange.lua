@@ -82,6 +82,15 @@ end
 
 local remember = M.remember
 
+--- Who asks, by its address: 40..4F are one host, a PC; second whether it is that.
+function M.host(address)
+  if address >= 0x40 and address <= 0x4F then
+    return 0x40, true
+  end
+  return address, false
+end
+local host_of = M.host
+
 --- A request. Returns "echo", "retry" or nil; and what is remembered of it, if it is no echo: { board = the one it
 -- names, or nil, data = the eight bytes that it writes, or nil, ... }.
 function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
@@ -113,13 +122,13 @@ function M.ask(bus, slot, number, raw, address, id, starts, ends, side)
     flag = "retry"
   end
   if not request then
-    local names = address >= 0x40 and address <= 0x4F
+    local host, names = host_of(address)
     request = {
       slot = slot,
       number = number,
       ended = ends,
       side = side,
-      host = names and 0x40 or address,
+      host = host,
       board = bus.can and byte(raw, 13) or names and address - 0x3F or nil, -- the board it names
       others = not bus.can and (address <= 0x40 or address > 0x4F), -- any board's reply will do
       data = is_write(id) and byte(raw, 4) == 8 and sub(raw, 5, 12) or nil,
@@ -187,7 +196,8 @@ end
 function M.answer(bus, slot, number, raw, address, id, starts)
   local state, times = bus.state, bus.times
   local list = state.asked[id]
-  local newest, missed
+  local host = bus.can and host_of(byte(raw, 13)) -- the one it is sent to
+  local chosen, newest, missed
   for i = list and list.last or 0, list and list.first or 1, -1 do
     local request = list[i]
     if not request.answered then
@@ -198,32 +208,41 @@ function M.answer(bus, slot, number, raw, address, id, starts)
           missed = request
         end
       elseif fits then
-        if i == list.last then
-          list[i] = nil
-          list.last = i - 1
-          request.over = true
-        else
-          request.answered = true
+        chosen = chosen or i
+        if not host or request.host == host then
+          chosen = i
+          break
         end
-        answered(bus, request.slot, number)
-        if board ~= address and board and address >= 0x01 and address <= 0x10 then
-          odd_of(bus.results, slot).other_board = board
-        end
-        if request.data and byte(raw, 4) == 8 then
-          odd_of(bus.results, slot).result = write_result(id, raw, request.data)
-        end
-        local wait = starts - request.ended
-        if wait < 0 then
-          wait = wait > -GRACE and 0.0 or nil
-        end
-        return request.number, wait
       else
         newest = newest or request
       end
     end
   end
-  unasked(bus, slot, number, address, newest, missed)
-  return nil, nil
+  if not chosen then
+    unasked(bus, slot, number, address, newest, missed)
+    return nil, nil
+  end
+  local request = list[chosen]
+  if chosen == list.last then
+    list[chosen] = nil
+    list.last = chosen - 1
+    request.over = true
+  else
+    request.answered = true
+  end
+  answered(bus, request.slot, number)
+  local board = request.board
+  if board ~= address and board and address >= 0x01 and address <= 0x10 then
+    odd_of(bus.results, slot).other_board = board
+  end
+  if request.data and byte(raw, 4) == 8 then
+    odd_of(bus.results, slot).result = write_result(id, raw, request.data)
+  end
+  local wait = starts - request.ended
+  if wait < 0 then
+    wait = wait > -GRACE and 0.0 or nil
+  end
+  return request.number, wait
 end
 
 --- Whether a request got no reply while it waited, as far as is known by now.

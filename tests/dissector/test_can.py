@@ -231,6 +231,99 @@ def test_a_short_reply_answers_and_says_nothing(see: Dissect) -> None:
     assert info(rows[8]) == "WRITE board 1  0xDA Charge MOS: not of eight bytes"
 
 
+def switch(at: float, host: int, byte: int, *, asks: bool) -> P:
+    return (request if asks else reply)(0xD9, data=f"{byte:02x}" + "00" * 7, host=host, at=at)
+
+
+def test_a_reply_belongs_to_the_request_of_the_host_that_it_is_sent_to(see: Dissect) -> None:
+    """The identifier says who is answered (field notes c.1): host 40 switches off, host 80 on, both as they wanted."""
+    rows = see(
+        [
+            request(0x90),
+            request(0x90, host=0x80, at=0.001),
+            reply(0x90, PACK, at=0.003),
+            reply(0x90, PACK, host=0x80, at=0.004),
+            switch(0.1, 0x40, 0, asks=True),
+            switch(0.101, 0x80, 1, asks=True),
+            switch(0.103, 0x40, 0, asks=False),
+            switch(0.104, 0x80, 1, asks=False),
+        ]
+    )
+    assert [numbers(row, "reply_in") for row in rows[:2]] == [[3], [4]]
+    assert [number(row, "request_in") for row in (rows[2], rows[3], rows[6], rows[7])] == [1, 2, 5, 6]
+    assert [number(row, "response_time") for row in rows[2:4]] == pytest.approx([0.003, 0.003], abs=2e-6)
+    assert [row["daly.write_result"] for row in rows[6:]] == [["confirmed"], ["confirmed"]]
+
+
+def test_a_reply_to_an_address_that_did_not_ask_answers_the_newest(see: Dissect) -> None:
+    """40 and 41 are one host; and a board may answer to 40 whoever asks."""
+    rows = see(
+        [
+            request(0x90, host=0x41),
+            reply(0x90, PACK, at=0.01),
+            request(0x90, host=0x80, at=0.1),
+            reply(0x90, PACK, at=0.11),
+        ]
+    )
+    assert [number(rows[n], "request_in") for n in (1, 3)] == [1, 3]
+
+
+def test_bursts_of_two_boards_run_side_by_side(see: Dissect) -> None:
+    frames = [reply(0x94, STATUS, board=board) for board in (1, 2)]
+    frames += [request(0x95, board=board, at=0.01) for board in (1, 2)]
+    for i, cells in enumerate(CELLS):
+        at = 0.02 + i / 100
+        frames += [reply(0x95, cells, at=at), reply(0x95, cells, board=2, at=at + 0.002)]
+        frames.append(reply(0x90, PACK, board=3, at=at + 0.004))
+    rows = see(frames)
+    parts = [rows[n] for n in (4, 5, 7, 8, 10, 11)]
+    assert [number(row, "request_in") for row in parts] == [3, 4] * 3
+    assert [numbers(row, "reassembled_in") for row in parts] == [[11], [12], [11], [12], [], []]
+    for row in parts[4:]:
+        assert numbers(row, "cells.voltage") == [3296, 3295, 3295, 3294, 3296, 3295, 3294, 3296]
+    assert not any("daly.burst.cut_off" in row or "daly.burst.missing" in row for row in rows)
+
+
+def test_bursts_of_one_board_to_two_hosts_run_side_by_side(see: Dissect) -> None:
+    frames = [reply(0x94, STATUS), request(0x95, at=0.01), request(0x95, host=0x80, at=0.011)]
+    for i, cells in enumerate(CELLS):
+        frames += [reply(0x95, cells, host=host, at=0.02 + i / 100) for host in (0x40, 0x80)]
+    rows = see(frames)
+    assert [number(row, "request_in") for row in rows[3:]] == [2, 3] * 3
+    assert [numbers(row, "reassembled_in") for row in rows[3:]] == [[8], [9], [8], [9], [], []]
+    assert not any("daly.burst.repeat" in row or "daly.unanswered" in row for row in rows)
+
+
+def test_a_burst_is_cut_off_by_its_own_board_alone(see: Dissect) -> None:
+    """Board 1 stops after one frame of three and says 0x90; board 2 stops too, and half a second goes by."""
+    rows = see(
+        [
+            *(reply(0x94, STATUS, board=board) for board in (1, 2)),
+            reply(0x95, CELLS[0], at=0.1),
+            reply(0x95, CELLS[0], board=2, at=0.11),
+            reply(0x90, PACK, at=0.12),
+            reply(0x98, "00" * 8, board=3, at=0.7),
+        ]
+    )
+    assert [number(row, "burst.cut_off") for row in rows] == [None, None, 1, 1, None, None]
+
+
+def test_only_a_request_to_its_board_makes_the_same_number_a_new_burst(see: Dissect) -> None:
+    sensors = "01323200000000ff"
+    rows = see(
+        [
+            request(0x96),
+            reply(0x96, sensors, at=0.01),
+            request(0x96, board=2, at=0.02),
+            reply(0x96, sensors, at=0.03),
+            request(0x96, at=0.04),
+            reply(0x96, sensors, at=0.05),
+        ]
+    )
+    assert [number(rows[n], "burst.repeat") for n in (1, 3, 5)] == [None, 1, None]
+    assert number(rows[5], "request_in") == 5
+
+
 def test_what_boards_remember_and_contradict(see: Dissect) -> None:
     """0x90 says 26.3 V; three cells of 3.3 V sum up to 9.9 V. Two boards are two memories."""
     rows = see(

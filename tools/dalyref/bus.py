@@ -37,9 +37,9 @@ class Bus:
         self._exchange = Exchange[Slate](options, echoes=echoes)
         self._charge = StatesOfCharge(options)
         self._modbus = ModbusBus(options, self._charge)
-        self._asked: dict[int, int] = {}  # requests seen, by data ID
+        self._asked: dict[tuple[int, int], int] = {}  # requests seen, by data ID and the one board that may answer
         self._boards: dict[int, Board] = {}  # by address byte of replies
-        self._burst: Burst[Slate] | None = None
+        self._running: dict[tuple[int, int], Burst[Slate]] = {}  # bursts, by the wire's lanes
 
     def frame(self, located: Located, message: Message, fields: Fields) -> Slate:
         """Take a frame: add what it means to its `fields`, and to those of records before it."""
@@ -72,7 +72,7 @@ class Bus:
         known = latest_ns > slate.waits_until()
         if slate.asks and known:
             slate.fields["daly.unanswered"] = True
-        if slate.burst is not None and slate.burst is self._burst:
+        if slate.burst is not None and slate.burst in self._running.values():
             parts.end(slate.burst, known=known)  # one that began in time, and ends later, goes on with it
         slate.close()
 
@@ -95,7 +95,8 @@ class Bus:
             fields["daly.write"] = True
             if message.whole:
                 fields.update(writes.would_set(data_id, message.content))
-        self._asked[data_id] = self._asked.get(data_id, 0) + 1
+        for whose in {0, message.route.only}:
+            self._asked[data_id, whose] = self._asked.get((data_id, whose), 0) + 1
         slate.open_until_ns = located.end_ns + self._reply_ns
         slate.asks = True
 
@@ -110,7 +111,7 @@ class Bus:
         elif data_id in bursts.IDS:
             self._part(located, message, slate)
         else:
-            self._end_burst()
+            self._end_burst(_lane(message))
             self._answer(located, message, slate)
             fields.update(payload.decode(data_id, message.content))
             seen = _seen(located)
@@ -121,7 +122,7 @@ class Bus:
     def _answer(self, located: Located, message: Message, slate: Slate) -> int:
         """Find the request of a reply; return its number, 0: none."""
         fields = slate.fields
-        answer = self._exchange.answer(message.data_id, message.route.board, located.start_ns)
+        answer = self._exchange.answer(message.data_id, message.route, located.start_ns)
         if answer.unasked:
             fields["daly.unasked"] = True
         if answer.late_to:
@@ -145,10 +146,11 @@ class Bus:
         """Take a reply that is one frame of several."""
         fields, data_id, content = slate.fields, message.data_id, message.content
         number = content[0]
-        burst = self._burst
+        lane = _lane(message)
+        burst = self._running.get(lane)
         if burst is not None and not burst.continues(data_id, message.route.address, located.start_ns, self._burst_ns):
             burst = None
-        asked = self._asked.get(data_id, 0)
+        asked = self._asked.get((data_id, lane[0]), 0)
         if burst is not None and (number < burst.last or (number == burst.last and asked > burst.asked)):
             burst = None
         base = self._base(located, message) if burst is None else burst.base
@@ -156,9 +158,9 @@ class Bus:
             parts.skip(data_id, content, slate)
             return
         if burst is None:
-            self._end_burst()
+            self._end_burst(lane)
             request = self._answer(located, message, slate)
-            burst = self._burst = self._begin(message, base, request, slate)
+            burst = self._running[lane] = self._begin(message, base, request, slate)
         elif burst.request:
             fields["daly.request_in"] = burst.request
         burst.asked = asked
@@ -184,11 +186,17 @@ class Bus:
         count = {cells.CELLS: board.cells, cells.TEMPERATURES: board.sensors}.get(data_id, 0)
         return Burst(data_id, address, base, count, request, slate)
 
-    def _end_burst(self) -> None:
-        """End the running burst."""
-        burst, self._burst = self._burst, None
+    def _end_burst(self, lane: tuple[int, int]) -> None:
+        """End the running burst of a lane."""
+        burst = self._running.pop(lane, None)
         if burst is not None:
             parts.end(burst)
+
+
+def _lane(message: Message) -> tuple[int, int]:
+    """Return by what bursts run side by side: on CAN board and host; a serial line has one at a time."""
+    route = message.route
+    return (route.address, route.host) if route.host else (0, 0)
 
 
 def _seen(located: Located) -> Seen:

@@ -50,7 +50,7 @@ def data_id(identifier: int) -> int:
 def _route(destination: int, source: int) -> Route:
     if is_host(source):
         return Route(True, 0, destination, destination, destination, addresses.host(source))
-    return Route(False, source, source)
+    return Route(False, source, source, host=addresses.host(destination))
 
 
 def message(frame: CanFrame) -> Message:

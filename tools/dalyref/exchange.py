@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from dalyref import addresses, writes
 
 if TYPE_CHECKING:
-    from dalyref.message import Message
+    from dalyref.message import Message, Route
     from dalyref.options import Options
     from dalyref.packet import Direction
 
@@ -35,6 +35,8 @@ class Request(Generic[T]):
     """Of its packet."""
     end_ns: int
     side: Direction
+    host: int
+    """Who asks."""
     only: int
     """The one board whose reply it takes, 0: any board's."""
     board: int
@@ -109,7 +111,7 @@ class Exchange(Generic[T]):
             retry = True
         data_id = message.data_id
         written = message.content if message.whole and writes.is_write(data_id) else b""
-        request = Request(number, end_ns, side, route.only, route.named, written, owner)
+        request = Request(number, end_ns, side, route.host, route.only, route.named, written, owner)
         self._newest[message.same] = request
         if len(self._newest) > _MOST_DIFFERENT:
             del self._newest[next(iter(self._newest))]
@@ -122,15 +124,17 @@ class Exchange(Generic[T]):
         second = last is not None and last[0] != host and start_ns - last[1] <= self._wait_ns
         return Asked(addresses.REQUEST, retry, second)
 
-    def answer(self, data_id: int, board: int, start_ns: int) -> Answer[T]:
+    def answer(self, data_id: int, route: Route, start_ns: int) -> Answer[T]:
         """Take a board's reply (the first of its burst): find the request it belongs to, which then waits no more."""
+        board = route.board
         asked = self._asked.get(data_id, [])
-        for index in range(len(asked) - 1, -1, -1):
-            request = asked[index]
-            if self._waits(request) and request.only in (0, board):
-                request.answered = True
-                del asked[index]
-                return Answer(request, other_board=bool(board and request.board not in (0, board)))
+        fitting = [request for request in reversed(asked) if self._waits(request) and request.only in (0, board)]
+        if fitting:
+            own = (request for request in fitting if request.host == route.host)
+            request = next(own, fitting[0])  # on CAN a board may answer to another address than the one that asked
+            request.answered = True
+            asked.remove(request)
+            return Answer(request, other_board=bool(board and request.board not in (0, board)))
         if self._host is None:
             return Answer(None)
         waiting = next((request for request in reversed(asked) if self._waits(request)), None)

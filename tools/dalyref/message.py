@@ -29,7 +29,7 @@ class Route:
     only: int = 0
     """Of a request: the one board whose reply it takes."""
     host: int = 0
-    """Of a request: who asks."""
+    """Who asks; of a reply who is told, 0: any (a serial frame does not say)."""
 
 
 class Message(NamedTuple):

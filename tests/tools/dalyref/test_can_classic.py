@@ -294,3 +294,99 @@ def test_memory_stays_bounded() -> None:
         frame = CanFrame(number=number, time_ns=number * 10**6, data=number.to_bytes(8), identifier=0x18900140)
         out += len(decoder.feed(frame))
     assert 26_000 < out < 30_000  # about two seconds are held
+
+
+CELLS = ("010ce00cdf0cdf00", "020cde0ce00cdf00", "030cde0ce00cdf00")
+"""Real burst can212-95: 8 cells, the first 3296 mV."""
+STATUS = "0802000000000040"
+"""Real frame can212-94: 8 cells, 2 sensors."""
+
+
+def test_a_reply_belongs_to_the_request_of_the_host_that_it_is_sent_to() -> None:
+    """Field notes c.1: destination | source. Both switch the discharge MOS; each is answered as it asked."""
+    capture = CanCapture()
+    off, on = "00" * 8, "01" + "00" * 7
+    capture.put(0, "18900140", off)
+    capture.put(1, "18900180", off)
+    capture.put(2, "18904001", PACK[1])
+    capture.put(3, "18908001", PACK[1])
+    capture.put(10, "18D90140", off)
+    capture.put(11, "18D90180", on)
+    capture.put(12, "18D94001", off)
+    capture.put(13, "18D98001", on)
+    fields = capture.fields()
+    assert {n: fields[n]["daly.request_in"] for n in (3, 4, 7, 8)} == {3: 1, 4: 2, 7: 5, 8: 6}
+    assert [fields[n]["daly.response_time"] for n in (3, 4)] == [0.002, 0.002]
+    assert [fields[n]["daly.write_result"] for n in (7, 8)] == ["confirmed", "confirmed"]
+
+
+def test_hosts_40_to_4f_are_one_and_a_reply_to_nobody_who_asked_answers_the_newest() -> None:
+    capture = CanCapture()
+    capture.put(0, "18900141")
+    capture.put(1, "18904001", PACK[1])
+    capture.put(2, "18910180")
+    capture.put(3, "18914001", "0ce0010cde040000")
+    fields = capture.fields()
+    assert (fields[2]["daly.request_in"], fields[4]["daly.request_in"]) == (1, 3)
+
+
+def test_bursts_of_two_boards_run_side_by_side() -> None:
+    capture = CanCapture()
+    capture.put(0, "18944001", STATUS)
+    capture.put(1, "18944002", STATUS)
+    capture.put(2, "18950140")
+    capture.put(3, "18950240")
+    for ms, part in enumerate(CELLS):
+        capture.put(10 + 2 * ms, "18954001", part)
+        capture.put(11 + 2 * ms, "18954002", part)
+        capture.put(11.5 + 2 * ms, "18904002", PACK[1])
+    fields = capture.fields()
+    for n, request, whole in ((5, 3, 11), (6, 4, None), (8, 3, 11), (9, 4, None), (11, 3, None), (12, 4, None)):
+        assert fields[n].get("daly.request_in", 4) == request
+        assert fields[n].get("daly.reassembled_in") == whole
+    assert fields[11]["daly.cells.voltage"] == [3296, 3295, 3295, 3294, 3296, 3295, 3294, 3296]
+    assert "daly.burst.cut_off" not in fields[5].keys() | fields[8].keys() | fields[11].keys()
+    # Board 2's own 0x90 ends its bursts each time.
+    assert fields[6]["daly.burst.cut_off"] is True
+
+
+def test_bursts_of_one_board_to_two_hosts_run_side_by_side() -> None:
+    capture = CanCapture()
+    capture.put(0, "18944001", STATUS)
+    capture.put(1, "18950140")
+    capture.put(2, "18950180")
+    for ms, part in enumerate(CELLS):
+        capture.put(10 + 2 * ms, "18954001", part)
+        capture.put(11 + 2 * ms, "18958001", part)
+    fields = capture.fields()
+    assert [fields[n]["daly.request_in"] for n in range(4, 10)] == [2, 3, 2, 3, 2, 3]
+    assert [fields[n].get("daly.reassembled_in") for n in range(4, 10)] == [8, 9, 8, 9, None, None]
+    for n in (8, 9):
+        assert fields[n]["daly.cells.count"] == 8
+    assert not any("daly.burst.repeat" in fields[n] for n in range(4, 10))
+
+
+def test_only_a_request_to_its_board_makes_the_same_number_a_new_burst() -> None:
+    capture = CanCapture()
+    sensors = "01323200000000ff"
+    capture.put(0, "18960140")
+    capture.put(1, "18964001", sensors)
+    capture.put(2, "18960240")
+    capture.put(3, "18964001", sensors)
+    capture.put(4, "18960140")
+    capture.put(5, "18964001", sensors)
+    fields = capture.fields()
+    assert fields[4]["daly.burst.repeat"] is True
+    assert "daly.burst.repeat" not in fields[6]
+    assert fields[6]["daly.request_in"] == 5
+
+
+def test_what_ends_with_the_capture_is_told_of_every_burst() -> None:
+    """Two bursts without a count, both running at the end: each last frame carries its table, as records.md 8 has it."""
+    capture = CanCapture()
+    for ms, part in enumerate(CELLS[:2]):
+        capture.put(2 * ms, "18954001", part)
+        capture.put(1 + 2 * ms, "18954002", part)
+    fields = capture.fields()
+    assert [fields[n].get("daly.cells.count") for n in (1, 2, 3, 4)] == [None, None, 6, 6]
+    assert [fields[n].get("daly.reassembled_in") for n in (1, 2)] == [3, 4]
