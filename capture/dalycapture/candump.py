@@ -55,8 +55,8 @@ def read_candump(source: Source, told: Told | None = None) -> Iterator[CapturedP
         value = int(identifier, 16) | (EXTENDED if len(identifier) == 8 else 0)
         content = bytes.fromhex((flexible or data or b"").decode())
         if remote:
-            packet = pack(value | REMOTE, b"", length=int(length or b"0"))
+            packet = pack(value | REMOTE, bytes(int(length or b"0")))
         else:
-            packet = pack(value, content, flags=FLEXIBLE | int(flags, 16) if flags else 0)
+            packet = pack(value, content, FLEXIBLE | int(flags, 16) if flags else 0)
         time_ns = int(seconds) * 1_000_000_000 + int(fraction.ljust(9, b"0"))
         yield CapturedPacket(number=number, time_ns=time_ns, data=packet, link_type=LINK_TYPE)

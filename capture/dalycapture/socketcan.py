@@ -34,9 +34,9 @@ class Frame(NamedTuple):
     data: bytes
 
 
-def pack(word: int, data: bytes, *, length: int | None = None, flags: int = 0) -> bytes:
-    """Lay out a packet. word: identifier with its flags; length: of a remote frame, which has no data."""
-    return _HEADER.pack(word, len(data) if length is None else length, flags) + data
+def pack(word: int, data: bytes, flags: int = 0) -> bytes:
+    """Lay out a packet. word: identifier with its flags; data: of a remote frame filling, as long as it says."""
+    return _HEADER.pack(word, len(data), flags) + data
 
 
 def unpack(packet: bytes) -> Frame | None:
@@ -48,7 +48,8 @@ def unpack(packet: bytes) -> Frame | None:
         return None
     extended = bool(word & EXTENDED)
     identifier = word & (0x1FFFFFFF if extended else 0x7FF)
-    if word & REMOTE:
-        return Frame(identifier, extended, True, b"")
     data = packet[8 : 8 + length]
-    return Frame(identifier, extended, False, data) if len(data) == length else None
+    if len(data) != length:
+        return None
+    remote = bool(word & REMOTE)
+    return Frame(identifier, extended, remote, b"" if remote else data)

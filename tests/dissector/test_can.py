@@ -196,6 +196,13 @@ def test_a_remote_frame_with_a_length_has_no_bytes(see: Dissect) -> None:
         assert number(rows[1], "retry") == 1
 
 
+def test_a_remote_frame_cut_off_is_not_ours(see: Dissect) -> None:
+    """Its length says eight; a capture holds so many bytes of filling, unless the snap length took them."""
+    whole = bytes.fromhex(can(0x18900140, "00" * 8, flags="extended+remote_transmission_request").hex)
+    rows = see([P(whole[:8].hex()), P(whole[:12].hex(), 0.1), P(whole.hex(), 0.2)])
+    assert kinds(rows) == ["", "", "frame"]
+
+
 def test_hosts(see: Dissect) -> None:
     """40 and 41 are one host, 80 is another."""
     rows = see([request(0x90), request(0x91, host=0x41, board=2, at=0.1), request(0x92, host=0x80, at=0.2)])
