@@ -266,7 +266,7 @@ def can(seed: int) -> Iterator[OnWire]:
             for at in range(0, len(data) - 12, 13):
                 if data[at] != 0xA5:
                     break
-                board, host = r.choice((1, 1, 2, 16, data[at + 1])), r.choice((0x40, 0x40, 0x41, 0x80, 0x20))
+                board, host = r.choice((1, 1, 2, 16, data[at + 1])), r.choice((*(0x40,) * 8, 0x41, 0x80, 0x20))
                 ends = (board, host) if data[at + 1] >= 0x20 else (host, board)
                 identifier = 0x18 << 24 | data[at + 2] << 16 | ends[0] << 8 | ends[1]
                 yield OnWire(now, _frame(r, identifier, data[at + 4 : at + 12]))
@@ -290,16 +290,17 @@ def can(seed: int) -> Iterator[OnWire]:
 def _frame(r: random.Random, identifier: int, data: bytes, *, plain: bool = False) -> bytes:
     """One SocketCAN packet; now and then shorter, remote, an error frame, CAN FD, or cut off."""
     flags = 0x80000000 if identifier > 0x7FF or r.random() < 0.1 else 0
-    fd = 0
+    fd, said = 0, None
     luck = 1.0 if plain else r.random()
     if luck < 0.03:
         data = data[: r.randrange(8)]
     elif luck < 0.04:
         flags |= 0x40000000
-        data = b""
+        said = r.choice((0, 0, 3, 8))
+        data = bytes(said if r.random() < 0.8 else said // 2)
     elif luck < 0.045:
         flags |= 0x20000000
     elif luck < 0.05:
         fd = 4
-    packet = (flags | identifier).to_bytes(4, "big") + bytes((len(data), fd, 0, 0)) + data
+    packet = (flags | identifier).to_bytes(4, "big") + bytes((len(data) if said is None else said, fd, 0, 0)) + data
     return packet[:-2] if 0.05 <= luck < 0.055 else packet
