@@ -200,9 +200,9 @@ function M.asked(bus, id, board)
   end
 end
 
---- A reply that is one of several frames, in its lane. `damaged`: what stands right before it in its stream is. Returns, each nil
--- where there is none: packet of its request; response time; what it is shown with; the table; packet of the burst's
--- table, where that came before.
+--- A reply that is one of several frames, in its lane. `damaged`: what stands right before it in its stream is.
+-- Returns, each nil where there is none: packet of its request; response time; what it is shown with; the table; packet
+-- of the burst's table, where that came before.
 function M.feed(bus, lane, slot, packet, raw, address, id, starts, ends, damaged)
   local state = bus.state
   local number = byte(raw, 5)

@@ -100,7 +100,8 @@ function M.feed(hkms, slot, number, shape, data, time)
     if burst then
       burst.asked = true -- the same number again begins a new burst
     end
-    local _, wait, memory, _, table_in = bursts.feed(stream, stream.state, slot, number, M.as_a5(shape, data), source, id, time, time)
+    local _, wait, memory, _, table_in =
+      bursts.feed(stream, stream.state, slot, number, M.as_a5(shape, data), source, id, time, time)
     note_reply(results, slot, nil, wait, memory, table_in)
   elseif shape.register == COUNTS then
     local board = hkms.boards[source] or {}

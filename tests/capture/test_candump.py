@@ -24,16 +24,16 @@ def test_remote_frames_hold_as_many_bytes_of_filling_as_they_say(tmp_path: Path)
     path.write_text(LOG)
     packets = [packet.data for packet in read_capture(path)]
     assert [data.hex() for data in packets] == [
-        "d8900140" "08000000" "0000000000000000",
-        "d8900140" "00000000",
-        "40000351" "02000000" "0000",
-        "98904001" "08000000" "01070000753002bc",
+        "d8900140080000000000000000000000",
+        "d890014000000000",
+        "40000351020000000000",
+        "989040010800000001070000753002bc",
     ]
     frames = [socketcan.unpack(data) for data in packets]
     assert [frame and (frame.remote, frame.data) for frame in frames[:3]] == [(True, b"")] * 3
 
 
 def test_what_is_cut_off_is_no_frame() -> None:
-    remote = bytes.fromhex("d8900140" "08000000" "0000000000000000")
+    remote = bytes.fromhex("d8900140080000000000000000000000")
     assert [socketcan.unpack(remote[:length]) for length in (0, 8, 12, 15)] == [None] * 4
     assert socketcan.unpack(remote) == socketcan.Frame(0x18900140, True, True, b"")

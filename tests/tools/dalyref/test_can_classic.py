@@ -382,7 +382,7 @@ def test_only_a_request_to_its_board_makes_the_same_number_a_new_burst() -> None
 
 
 def test_what_ends_with_the_capture_is_told_of_every_burst() -> None:
-    """Two bursts without a count, both running at the end: each last frame carries its table, as records.md 8 has it."""
+    """Two bursts without a count, both running at the end: each last frame carries its table (records.md 8)."""
     capture = CanCapture()
     for ms, part in enumerate(CELLS[:2]):
         capture.put(2 * ms, "18954001", part)

@@ -162,7 +162,7 @@ class Directions:
             if direction == REPLY:
                 begins = bool(answers[at]) if at < first else follow.reply(at - known)
                 if begins:
-                    book.answer(message.data_id, message.route.board, start_ns)
+                    book.answer(message.data_id, message.route, start_ns)
                 continue
             if direction == ECHO and data not in asked:
                 continue  # of a request that waits no longer
