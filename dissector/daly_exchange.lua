@@ -23,6 +23,9 @@ function M.is_write(id)
 end
 local is_write = M.is_write
 
+-- IDs that answer in several frames which nothing numbers: the fault log, and a written clock.
+local UNNUMBERED = { [0x64] = true, [0x21] = true }
+
 -- So many unanswered requests for one ID are remembered, whatever a capture holds.
 local MOST_ASKED = 1024
 
@@ -36,6 +39,7 @@ function M.state()
     host = nil, -- who asked last, and when that ended
     host_ended = nil,
     latest = -math.huge, -- latest beginning of a frame
+    going_on = {}, -- of UNNUMBERED, by ID, address and host: { request = its packet, began = the newest reply, s }
   }
 end
 
@@ -218,11 +222,20 @@ function M.answer(bus, slot, number, raw, address, id, starts)
       end
     end
   end
+  local kind = UNNUMBERED[id] and (id * 256 + address) * 256 + (host or 0)
   if not chosen then
+    local before = kind and state.going_on[kind]
+    if before and starts - before.began <= times.burst + GRACE then
+      before.began = starts
+      return before.request, nil
+    end
     unasked(bus, slot, number, address, newest, missed)
     return nil, nil
   end
   local request = list[chosen]
+  if kind then
+    state.going_on[kind] = { request = request.number, began = starts }
+  end
   if chosen == list.last then
     list[chosen] = nil
     list.last = chosen - 1

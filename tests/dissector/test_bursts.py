@@ -167,6 +167,16 @@ def test_the_frames_of_a_burst_belong_to_its_request(dissect: Dissect) -> None:
     assert number(rows[2], "response_time") is None
 
 
+def test_a_fault_log_in_several_frames_answers_one_request(dissect: Dissect) -> None:
+    """Field notes a.2: 0x64 comes in four frames an entry, which nothing numbers."""
+    at = (0, 0.05, 0.07, 0.09, 0.9)
+    rows = dissect([P(a5(0x40, 0x64), at[0]), *(P(a5(0x01, 0x64, "01"), seconds) for seconds in at[1:])])
+    assert numbers(rows[0], "reply_in") == [2]
+    assert [number(row, "request_in") for row in rows[1:]] == [1, 1, 1, None]
+    assert ["daly.response_time" in row for row in rows[1:]] == [True, False, False, False]
+    assert [number(row, "unasked") for row in rows[1:]] == [None, None, None, 1]
+
+
 def test_temperatures_of_real_sensors_only(dissect: Dissect) -> None:
     rows = dissect(in_a_row(status(5, 2), sensors(1, 21, -3, 99), sensors(2, 1, 2)))
     assert numbers(rows[1], "temperature") == [21, -3]

@@ -129,6 +129,8 @@ class Bus:
             fields["daly.late_to"] = answer.late_to
         if answer.other_board:
             fields["daly.other_board"] = True
+        if answer.follows:
+            fields["daly.request_in"] = answer.follows
         if answer.request is None:
             return 0
         links.link(answer.request, located, slate)

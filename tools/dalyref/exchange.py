@@ -69,6 +69,12 @@ class Answer(Generic[T]):
     """Packet of the request that it comes too late for, 0: none."""
     unasked: bool = False
     other_board: bool = False
+    follows: int = 0
+    """Packet of the request whose answer it goes on with, 0: none."""
+
+
+UNNUMBERED = frozenset((0x64, 0x21))
+"""Data IDs that answer in several frames without numbers."""
 
 
 class Exchange(Generic[T]):
@@ -80,6 +86,9 @@ class Exchange(Generic[T]):
         self._wait_ns = options.limit_ns(options.reply)
         self._echo_ns = options.limit_ns(options.echo)
         self._late_ns = options.limit_ns(options.late)
+        self._quiet_ns = options.limit_ns(options.burst)
+        self._going_on: dict[tuple[int, int, int], tuple[int, int]] = {}
+        """Of UNNUMBERED, by ID, address and host: packet of the request, and when the newest reply began (ns)."""
         self._newest: dict[bytes, Request[T]] = {}
         self._asked: dict[int, list[Request[T]]] = {}  # by data ID, unanswered, oldest first
         self._host: tuple[int, int] | None = None  # who asked last, and when that ended (ns)
@@ -128,15 +137,22 @@ class Exchange(Generic[T]):
         """Take a board's reply (the first of its burst): find the request it belongs to, which then waits no more."""
         board = route.board
         asked = self._asked.get(data_id, [])
+        kind = (data_id, route.address, route.host)
         fitting = [request for request in reversed(asked) if self._waits(request) and request.only in (0, board)]
         if fitting:
             own = (request for request in fitting if request.host == route.host)
             request = next(own, fitting[0])  # on CAN a board may answer to another address than the one that asked
             request.answered = True
             asked.remove(request)
+            if data_id in UNNUMBERED:
+                self._going_on[kind] = request.number, start_ns
             return Answer(request, other_board=bool(board and request.board not in (0, board)))
         if self._host is None:
             return Answer(None)
+        follows, began_ns = self._going_on.get(kind, (0, 0))
+        if follows and start_ns - began_ns <= self._quiet_ns:
+            self._going_on[kind] = follows, start_ns
+            return Answer(None, follows=follows)
         waiting = next((request for request in reversed(asked) if self._waits(request)), None)
         other = waiting is not None and board != 0 and waiting.board not in (0, board)
         for request in reversed(asked):

@@ -245,3 +245,19 @@ def test_damaged_frames_change_nothing() -> None:
     capture.put(70, ANSWER)
     assert capture.field("daly.kind") == ["frame", "bad_checksum", "frame"]
     assert capture.field("daly.request_in") == [None, None, 1]
+
+
+def test_a_fault_log_in_several_frames_answers_one_request() -> None:
+    """Field notes a.2: 0x64 comes in four frames an entry, which nothing numbers."""
+    capture = Capture()
+    capture.put(0, frame(0x40, 0x64))
+    for ms in (50, 70, 90):
+        capture.put(ms, frame(0x01, 0x64, 1))
+    capture.put(900, frame(0x01, 0x64, 1))
+    request, first, *later, beyond = (record.fields for record in capture.read())
+    assert request["daly.reply_in"] == 2
+    assert "daly.response_time" in first
+    assert [fields["daly.request_in"] for fields in (first, *later)] == [1, 1, 1]
+    assert not any("daly.response_time" in fields or "daly.unasked" in fields for fields in later)
+    assert beyond["daly.unasked"] is True
+    assert "daly.request_in" not in beyond
