@@ -277,6 +277,9 @@ function M.note_before(bus, slot, address, id)
     was, was_in = ("\0"):rep(6) .. char(math.floor(charge / 256), charge % 256), board.pack.packet
   elseif board.settings and board.settings[id + 0x40] then
     was, was_in = board.settings[id + 0x40], board.settings[-id - 0x40]
+    if id == 0x21 then
+      was = sub(was, 1, 6) -- 0x61 tells the clock; where a write has the SOC, it has stale bytes
+    end
   end
   if was then
     local odd = results_module.odd(bus.results, slot)

@@ -501,7 +501,10 @@ local function values_of(list, raw, at)
   local told = {}
   for i = 1, #list do
     local name, first, length, kind, unit, names = table.unpack(list[i], 1, 6)
-    local value = quantities.read[kind](raw, at + first, length)
+    local value = nil
+    if at + first + length - 1 <= #raw then
+      value = quantities.read[kind](raw, at + first, length)
+    end
     if value ~= nil then
       told[#told + 1] = { quantities.label(name), quantities.words(kind, value, unit, names) }
     end
@@ -583,7 +586,7 @@ local RESTART = 0x00
 local REVERSE = " (01 is on, as every device seen has it; the vendor's article of 2024 says 00)"
 
 --- What a request that writes would change, in words, short and in full. `was`: what the board had before, the same
--- eight bytes, and `was_in`: the packet that told; nil where nothing is known.
+-- bytes (fewer, where no more is known), and `was_in`: the packet that told; nil where nothing is known.
 function M.write_words(id, raw, was, was_in)
   if id == RESTART then
     return "restarts the board", "restarts the board"
@@ -597,10 +600,11 @@ function M.write_words(id, raw, was, was_in)
   for _, one in ipairs(was and values_of(list, was, 1) or {}) do
     before[one[1]] = one[2]
   end
-  local sets, differs = {}, {}
+  local sets, differs, all_known = {}, {}, true
   for i = 1, #told do
     local label, value = told[i][1], told[i][2]
     sets[i] = format("%s to %s", label, value)
+    all_known = all_known and before[label] ~= nil
     if before[label] and before[label] ~= value then
       differs[#differs + 1] = format("%s was %s", label, before[label])
     end
@@ -617,7 +621,7 @@ function M.write_words(id, raw, was, was_in)
   end
   if #differs > 0 then
     full = format("%s; by packet %d, %s", full, was_in, concat(differs, ", "))
-  elseif was then
+  elseif was and all_known then -- half of it may be known only: 0x90 tells the SOC, and no clock
     full = format("%s; the same as in packet %d", full, was_in)
   end
   return text, full

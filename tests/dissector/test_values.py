@@ -62,6 +62,26 @@ BEFORE = {
         a5(0x40, 0x21, "00000000000003e8"),
         "WRITE: sets SOC to 100.0 %; by packet 1, SOC was 90.0 %",
     ),
+    "SOC and clock, the SOC is known and the same": (
+        a5(1, 0x90, "0213000075300384"),
+        a5(0x40, 0x21, "1a030517320a0384"),
+        "WRITE: sets clock to 2026-03-05 23:50:10, SOC to 90.0 %",
+    ),
+    "the clock that 0x61 told, behind which stand stale bytes": (
+        a5(1, 0x61, "1a03051732090000"),
+        a5(0x40, 0x21, "1a030517320a03e8"),
+        ("WRITE: sets clock to 2026-03-05 23:50:10, SOC to 100.0 %; by packet 1, clock was 2026-03-05 23:50:09"),
+    ),
+    "no clock, and only 0x61 was heard": (
+        a5(1, 0x61, "1a0305173209012c"),
+        a5(0x40, 0x21, "00000000000003e8"),
+        "WRITE: sets SOC to 100.0 %",
+    ),
+    "the same clock, and the SOC is not known": (
+        a5(1, 0x61, "1a0305173209012c"),
+        a5(0x40, 0x21, "1a0305173209012c"),
+        "WRITE: sets clock to 2026-03-05 23:50:09, SOC to 30.0 %",
+    ),
     "nothing new": (
         a5(1, 0x5F, "0ed80032"),
         a5(0x40, 0x1F, "0ed80032"),
