@@ -171,7 +171,8 @@ end
 -- What the reply to a write says of it.
 local function write_result(id, raw, written)
   if id == 0xD9 or id == 0xDA then
-    return byte(raw, 5) == byte(written) and "confirmed" or "denied"
+    -- The board tells a state, on or off; whoever asked may have sent any byte for on.
+    return (byte(raw, 5) ~= 0) == (byte(written) ~= 0) and "confirmed" or "denied"
   elseif id == 0x21 then
     return byte(raw, 5) == 1 and "confirmed" or "denied"
   end

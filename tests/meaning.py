@@ -300,6 +300,18 @@ CASES: dict[str, list[Heard]] = {
         Heard(a5(0x40, 0xD9, "00"), 1, {"write": True}),
         Heard(a5(1, 0xD9, "01"), 1.05, {"write_result": "denied"}),
     ],
+    "any byte but 00 switches on": [  # the board tells a state, on or off, and not the byte that it was sent
+        Heard(a5(0x40, 0xDA, "02"), 0, {"write": True}),
+        Heard(a5(1, 0xDA, "01"), 0.05, {"write_result": "confirmed"}),
+        Heard(a5(0x40, 0xD9, "ff"), 1, {"write": True}),
+        Heard(a5(1, 0xD9, "01"), 1.05, {"write_result": "confirmed"}),
+        Heard(a5(0x40, 0xD9, "ff"), 2, {"write": True}),
+        Heard(a5(1, 0xD9, "00"), 2.05, {"write_result": "denied"}),
+        Heard(a5(0x40, 0xDA, "00"), 3, {"write": True}),
+        Heard(a5(1, 0xDA, "00"), 3.05, {"write_result": "confirmed"}),
+        Heard(a5(0x40, 0xDA, "00"), 4, {"write": True}),
+        Heard(a5(1, 0xDA, "80"), 4.05, {"write_result": "denied"}),
+    ],
     "clock and SOC": [
         Heard(a5(0x40, 0x21, "170817120000 01f4".replace(" ", "")), 0, {"write": True}),
         Heard(a5(1, 0x21, "01"), 0.05, {"write_result": "confirmed"}),

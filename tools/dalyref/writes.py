@@ -56,7 +56,8 @@ def would_set(data_id: int, data: bytes) -> Fields:
 def result(data_id: int, written: bytes, answer: bytes) -> str:
     """Return what a reply's eight data bytes say of a write's eight."""
     if data_id in (DISCHARGE_MOS, CHARGE_MOS):
-        return CONFIRMED if answer[0] == written[0] else DENIED
+        # States: 02 asks for on as 01 does.
+        return CONFIRMED if bool(answer[0]) == bool(written[0]) else DENIED
     if data_id == SET_CLOCK:
         return CONFIRMED if answer[0] == 1 else DENIED
     return CONFIRMED if data_id != RESTART and answer == written else ANSWERED

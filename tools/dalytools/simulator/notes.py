@@ -41,10 +41,10 @@ class Notes:
         reply = heard[0] if heard else b""
         if request[0] == START:
             data_id, same = request[2], reply[4:12] == request[4:12]
-            first = request[4] if data_id in {0xD9, 0xDA} else 1
-            if data_id in {0xD9, 0xDA, 0x21}:
-                taken = reply[4:5] == bytes((first,))
-                result = "confirmed" if taken else "denied"
+            if data_id in {0xD9, 0xDA}:  # states: any byte but 00 is on
+                result = "confirmed" if any(reply[4:5]) == any(request[4:5]) else "denied"
+            elif data_id == 0x21:
+                result = "confirmed" if reply[4:5] == b"\x01" else "denied"
             else:
                 result = "confirmed" if same and data_id else "answered"
             facts = {"dialect": "a5", "data_id": data_id, "value": request[4:12].hex()}
