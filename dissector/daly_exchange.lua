@@ -174,7 +174,12 @@ local function write_result(id, raw, written)
     -- The board tells a state, on or off; whoever asked may have sent any byte for on.
     return (byte(raw, 5) ~= 0) == (byte(written) ~= 0) and "confirmed" or "denied"
   elseif id == 0x21 then
-    return byte(raw, 5) == 1 and "confirmed" or "denied"
+    -- A repeat says nothing by its byte 0, which is the year's.
+    local first = byte(raw, 5)
+    if first > 1 or sub(raw, 5, 12) == written then
+      return "answered"
+    end
+    return first == 1 and "confirmed" or "denied"
   end
   return id ~= 0x00 and sub(raw, 5, 12) == written and "confirmed" or "answered"
 end

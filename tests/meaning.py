@@ -316,7 +316,21 @@ CASES: dict[str, list[Heard]] = {
         Heard(a5(0x40, 0x21, "170817120000 01f4".replace(" ", "")), 0, {"write": True}),
         Heard(a5(1, 0x21, "01"), 0.05, {"write_result": "confirmed"}),
         Heard(a5(0x40, 0x21, "17081712000001f4"), 1, {"write": True}),
-        Heard(a5(1, 0x21, "17081712000001f4"), 1.05, {"write_result": "denied"}),
+        Heard(a5(1, 0x21, "00"), 1.05, {"write_result": "denied"}),
+    ],
+    "what a reply to a clock and a SOC does not tell": [  # a repeat, of the year 01 and 00 too; and any other byte
+        Heard(a5(0x40, 0x21, "17081712000001f4"), 0, {"write": True}),
+        Heard(a5(1, 0x21, "17081712000001f4"), 0.05, {"write_result": "answered"}),
+        Heard(a5(0x40, 0x21, "01081712000001f4"), 1, {"write": True}),
+        Heard(a5(1, 0x21, "01081712000001f4"), 1.05, {"write_result": "answered"}),
+        Heard(a5(0x40, 0x21, "01081712000001f4"), 2, {"write": True}),
+        Heard(a5(1, 0x21, "01081712000001f5"), 2.05, {"write_result": "confirmed"}),  # stale bytes behind byte 0
+        Heard(a5(0x40, 0x21, "00000000000001f4"), 3, {"write": True}),
+        Heard(a5(1, 0x21, "00000000000001f4"), 3.05, {"write_result": "answered"}),
+        Heard(a5(0x40, 0x21, "00000000000001f4"), 4, {"write": True}),
+        Heard(a5(1, 0x21, "00081712000001f4"), 4.05, {"write_result": "denied"}),
+        Heard(a5(0x40, 0x21, "17081712000001f4"), 5, {"write": True}),
+        Heard(a5(1, 0x21, "02"), 5.05, {"write_result": "answered"}),
     ],
     "settings and restart": [
         Heard(a5(0x40, 0x10, "000493e000000ce4"), 0, {"write": True}),

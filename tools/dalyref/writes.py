@@ -5,7 +5,8 @@
 |--------|----------------------------------------------|----------------------------------|
 | 00     | restart                                      | rarely seen                      |
 | D9, DA | discharge, charge MOS: byte 0 01 on, 00 off  | byte 0 is the new state          |
-| 21     | clock (bytes 0-5), SOC (6-7, 0.1 %)          | byte 0 is 1 when it was taken    |
+| 21     | clock (bytes 0-5), SOC (6-7, 0.1 %)          | byte 0 is 1 when it was taken,   |
+|        |                                              | by one source; 0 when not        |
 | 10..2A | write = read - 40 of the settings 50..6A     | not known                        |
 
 On and off of D9 and DA are as devices have them; the vendor's article of 2024 has them the other way round (fact 7).
@@ -59,5 +60,7 @@ def result(data_id: int, written: bytes, answer: bytes) -> str:
         # States: 02 asks for on as 01 does.
         return CONFIRMED if bool(answer[0]) == bool(written[0]) else DENIED
     if data_id == SET_CLOCK:
-        return CONFIRMED if answer[0] == 1 else DENIED
+        if answer == written:  # whether it was taken is not known: byte 0 is the year's, 1 or not
+            return ANSWERED
+        return {1: CONFIRMED, 0: DENIED}.get(answer[0], ANSWERED)
     return CONFIRMED if data_id != RESTART and answer == written else ANSWERED

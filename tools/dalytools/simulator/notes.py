@@ -44,7 +44,8 @@ class Notes:
             if data_id in {0xD9, 0xDA}:  # states: any byte but 00 is on
                 result = "confirmed" if any(reply[4:5]) == any(request[4:5]) else "denied"
             elif data_id == 0x21:
-                result = "confirmed" if reply[4:5] == b"\x01" else "denied"
+                taken = {b"\x01": "confirmed", b"\x00": "denied"}
+                result = "answered" if same else taken.get(reply[4:5], "answered")
             else:
                 result = "confirmed" if same and data_id else "answered"
             facts = {"dialect": "a5", "data_id": data_id, "value": request[4:12].hex()}
