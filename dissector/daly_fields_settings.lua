@@ -18,7 +18,7 @@ local NAMES = require("daly_settings").NAMES
 function M.declare(add)
   -- Ratings, field notes a.2: 0x50 to 0x53; Modbus 80 to 8A (D2), 100 to 117 (81).
   add("setting.rated_capacity", "setting.rated_capacity", plain(ProtoField.uint32, "Rated capacity", "Rated capacity, mAh; 0x50 bytes 0-3, D2 80, 81 109-10A [seen by several]"))
-  add("setting.cell_nominal_voltage", "setting.cell_nominal_voltage", plain(ProtoField.uint32, "Nominal cell voltage", "Nominal cell voltage, mV; 0x50 bytes 4-7, D2 81, 81 114 [seen by several]"))
+  add("setting.cell_nominal_voltage", "setting.cell_nominal_voltage", plain(ProtoField.uint32, "Nominal cell voltage", "Nominal cell voltage, mV; 0x50 bytes 6-7 (some sources: 4-7), D2 81, 81 114 [seen by several]"))
   add("setting.board_count", "setting.board_count", plain(ProtoField.uint16, "Acquisition boards", "Acquisition boards; 0x51 byte 0, D2 82 [seen by several]"))
   add("setting.cells_1", "setting.cells_1", plain(ProtoField.uint16, "Cells of board 1", "Cells of acquisition board 1; 0x51 byte 1, D2 83 [seen by several]"))
   add("setting.cells_2", "setting.cells_2", plain(ProtoField.uint16, "Cells of board 2", "Cells of acquisition board 2; 0x51 byte 2, D2 84 [seen by several]"))

@@ -33,7 +33,7 @@ local NAMES = M.NAMES
 local READS = {
   [0x50] = {
     { "setting.rated_capacity",         0, 4, "number", " mAh" },
-    { "setting.cell_nominal_voltage",   4, 4, "number", " mV" },
+    { "setting.cell_nominal_voltage",   6, 2, "number", " mV" }, -- some have 4 bytes; with others than 00 no voltage
   },
   [0x51] = {
     { "setting.board_count",            0, 1, "number" },

@@ -60,7 +60,10 @@ A5_CASES: dict[str, list[Heard]] = {
     "a probe": [Heard(a5(0x80, 0x02), 0)],
     "50": reply(0x50, "00007530 00000e10", {"setting.rated_capacity": 30000, "setting.cell_nominal_voltage": 3600}),
     "50, all ones": reply(
-        0x50, "ffffffff ffffffff", {"setting.rated_capacity": 2**32 - 1, "setting.cell_nominal_voltage": 2**32 - 1}
+        0x50, "ffffffff ffffffff", {"setting.rated_capacity": 2**32 - 1, "setting.cell_nominal_voltage": 65535}
+    ),
+    "50, filling before the voltage": reply(
+        0x50, "00007530 aaaa0e10", {"setting.rated_capacity": 30000, "setting.cell_nominal_voltage": 3600}
     ),
     "51": reply(
         0x51,
@@ -198,6 +201,9 @@ A5_CASES: dict[str, list[Heard]] = {
     # a.3
     "00": write(0x00, "", {"command": "restart"}),
     "10": write(0x10, "000493e0 00000ce4", {"setting.rated_capacity": 300000, "setting.cell_nominal_voltage": 3300}),
+    "10, filling before the voltage": write(
+        0x10, "000493e0 aaaa0ce4", {"setting.rated_capacity": 300000, "setting.cell_nominal_voltage": 3300}
+    ),
     "13": write(
         0x13,
         "02 01 000000 0708 00",

@@ -20,7 +20,7 @@ _Row: TypeAlias = tuple[int, int, str, Meaning]
 TABLE: dict[int, tuple[_Row, ...]] = {
     0x50: (
         (0, 3, "setting.rated_capacity", number),  # mAh
-        (4, 7, "setting.cell_nominal_voltage", number),  # mV
+        (6, 7, "setting.cell_nominal_voltage", number),  # mV; by some 4-7, which is absurd with more than 00 in 4-5
     ),
     0x51: (  # acquisition boards, and the cells and sensors of each
         (0, 0, "setting.board_count", number),

@@ -38,7 +38,7 @@ FOUR = ("_high_1", "_high_2", "_low_1", "_low_2")
 REPLIES: list[tuple[int, str, dict[str, object]]] = [
     # heezes (field notes a.2): 30000 mAh, 3600 mV
     (0x50, "00007530 00000e10", named(rated_capacity=30000, cell_nominal_voltage=3600)),
-    (0x50, "000493e0 00010ce4", named(rated_capacity=300000, cell_nominal_voltage=68836)),
+    (0x50, "000493e0 00010ce4", named(rated_capacity=300000, cell_nominal_voltage=3300)),
     (
         0x51,
         "02 10 08 07 04 03 02 ff",

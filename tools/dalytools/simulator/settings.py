@@ -3,7 +3,7 @@
 
     A5   50 .. 6A read, one frame each (texts: several), u16 and u32 high byte first; writes are read - 40 (10 .. 2A)
 
-    50   capacity mAh u32               nominal mV u32
+    50   capacity mAh u32               .       nominal mV
     51   boards  cells of 1, 2, 3        sensors of 1, 2, 3       .
     52   charged Ah u32                 discharged Ah u32
     53   type    mode    YY  MM  DD     sleep s u16               drift
@@ -45,7 +45,7 @@ def _four(what: str, size: int = 2, offset: int = 0) -> tuple[Slot, ...]:
 
 
 LAYOUTS: Final[dict[int, tuple[Slot, ...]]] = {
-    0x50: (Slot("rated_capacity", 4), Slot("cell_nominal_voltage", 4)),
+    0x50: (Slot("rated_capacity", 4), Slot("", 2), Slot("cell_nominal_voltage", 2)),
     0x51: (
         Slot("board_count", 1),
         *(Slot(f"{what}_{unit}", 1) for what in ("cells", "sensors") for unit in (1, 2, 3)),
