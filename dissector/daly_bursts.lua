@@ -29,6 +29,9 @@ local IDS = {
 
 M.IDS = IDS
 
+-- Characters of a text, where field notes a.2 tell: what stands behind them in its last frame is stale.
+local LETTERS = { [0x55] = 16, [0x56] = 32, [0x57] = 35, [0x6A] = 32 }
+
 -- Values in one frame.
 local PER_FRAME = { [0x95] = 3, [0x96] = 7 }
 
@@ -278,13 +281,13 @@ function M.feed(bus, lane, slot, packet, raw, address, id, starts, ends, damaged
   return burst.request, wait, memory, list, table_in
 end
 
---- The characters of a text burst, without the padding at its end.
+--- The characters of a text burst, without the padding at its end and what stands behind it.
 function M.text(burst)
   local parts = {}
   for number = burst.base, burst.number do
     parts[#parts + 1] = burst.texts[number]
   end
-  return (table.concat(parts):match("^(.-)[%z\xFF\x20]*$"))
+  return (sub(concat(parts), 1, LETTERS[burst.id] or -1):match("^(.-)[%z\xFF\x20]*$"))
 end
 
 --- The packet in which the whole of a frame's burst stands, or nil; `again`: the capture was read to its end.

@@ -242,6 +242,38 @@ CASES: dict[str, list[Heard]] = {
         Heard(text(0x6A, 2, b"\xff\xff\x20\x20\0\0\0"), 0.02),
         Heard(ASK, 2),
     ],
+    "a text is as long as its ID has it, and what stands behind that is stale": [
+        Heard(text(0x55, 1, b"DALY BM"), 0, {"reassembled_in": 3}),
+        Heard(text(0x55, 2, b"S Co Lt"), 0.02, {"reassembled_in": 3}),
+        Heard(text(0x55, 3, b"d.stale"), 0.04, {"manufacturer": "DALY BMS Co Ltd."}),
+        Heard(text(0x6A, 1, b"S234567"), 1, {"reassembled_in": 8}),
+        Heard(text(0x6A, 2, b"8901234"), 1.02, {"reassembled_in": 8}),
+        Heard(text(0x6A, 3, b"5678901"), 1.04, {"reassembled_in": 8}),
+        Heard(text(0x6A, 4, b"2345678"), 1.06, {"reassembled_in": 8}),
+        Heard(text(0x6A, 5, b"9012\xaaUZ"), 1.08, {"serial_number": "S2345678901234567890123456789012"}),
+        Heard(text(0x56, 0, b"N234567"), 2, {"reassembled_in": 13}),  # from 0
+        Heard(text(0x56, 1, b"8901234"), 2.02, {"reassembled_in": 13}),
+        Heard(text(0x56, 2, b"5678901"), 2.04, {"reassembled_in": 13}),
+        Heard(text(0x56, 3, b"2345678"), 2.06, {"reassembled_in": 13}),
+        Heard(text(0x56, 4, b"90  xyz"), 2.08, {"battery_name": "N23456789012345678901234567890"}),
+        Heard(ASK, 4),
+    ],
+    "a code of 35 letters, in a sixth frame nothing of it": [
+        *(Heard(text(0x57, n, b"ABCDEFG"), 0.02 * n, {"reassembled_in": 6}) for n in range(1, 6)),
+        Heard(text(0x57, 6, b"HIJKLMN"), 0.12, {"battery_code": 5 * "ABCDEFG"}),
+        Heard(ASK, 2),
+    ],
+    "a name of padding, stale letters behind it, is none": [
+        *(Heard(text(0x56, n, b" " * 7), 0.02 * n) for n in range(1, 5)),
+        Heard(text(0x56, 5, b"\0\0\0\0abc"), 0.1),
+        Heard(ASK, 2),
+    ],
+    "versions have no length": [
+        Heard(text(0x62, 1, b"V234567"), 0, {"reassembled_in": 3}),
+        Heard(text(0x62, 2, b"8901234"), 0.02, {"reassembled_in": 3}),
+        Heard(text(0x62, 3, b"5678901"), 0.04, {"software_version": "V23456789012345678901"}),
+        Heard(ASK, 2),
+    ],
     "a text with a hole is none": [
         Heard(text(0x57, 1, b"1234567"), 0),
         Heard(text(0x57, 3, b"8"), 0.02),

@@ -97,7 +97,7 @@ class Burst(Generic[T]):
             return cells.table(self.slots())
         if self.data_id == cells.TEMPERATURES:
             return cells.sensor_table(self.slots())
-        text = texts.whole(self.text)
+        text = texts.whole(self.data_id, self.text)
         return {texts.FIELDS[self.data_id]: text} if text else {}
 
 

@@ -22,6 +22,9 @@ FIELDS = {
 }
 """Which text it is, by data ID."""
 
+_LENGTH = {0x55: 16, 0x56: 32, 0x57: 35, 0x6A: 32}
+"""How many characters a text has, by data ID. Of 62 and 63 the sources tell frames only."""
+
 _PADDING = b"\x00\xff\x20"
 
 
@@ -35,6 +38,7 @@ def trimmed(characters: bytes) -> str:
     return shown(characters.rstrip(_PADDING))
 
 
-def whole(parts: Mapping[int, bytes]) -> str:
-    """Put the characters of a burst's frames together, by frame number."""
-    return trimmed(b"".join(parts[number] for number in sorted(parts)))
+def whole(data_id: int, parts: Mapping[int, bytes]) -> str:
+    """Put the characters of a burst's frames together, by frame number; what the last has beyond the text is stale."""
+    characters = b"".join(parts[number] for number in sorted(parts))
+    return trimmed(characters[: _LENGTH.get(data_id)])

@@ -228,7 +228,7 @@ def ended(burst: Running, found: Found) -> None:
     if burst.data_id in _WIDTH:
         _tell(burst, found)
     elif burst.data_id in texts.FIELDS:
-        text = texts.whole(burst.parts)
+        text = texts.whole(burst.data_id, burst.parts)
         if text:
             found.texts.append((*burst.told, burst.address, burst.data_id, text))
 

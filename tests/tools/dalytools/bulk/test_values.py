@@ -88,6 +88,15 @@ def test_the_plain_decoder_takes_over_anywhere(
         assert quick_fields(path, chunk=600) == expected
 
 
+def test_what_stands_behind_a_text_is_no_part_of_it(tmp_path: Path) -> None:
+    """The manufacturer has 16 letters (field notes a.2): two in the third frame, and stale bytes behind them."""
+    frames = [a5(1, 0x55, bytes((n,)) + part) for n, part in enumerate((b"DALY BM", b"S Co Lt", b"d.stale"), 1)]
+    path = write_packets(tmp_path / "x.pcapng", [*((0.02 * n, each) for n, each in enumerate(frames)), (2.0, ASK)])
+    assert agree(path, 1 << 20) == 4
+    texts = [text for batch in read(path) for text in batch.texts]
+    assert [text[-1] for text in texts] == ["DALY BMS Co Ltd."]
+
+
 # What only the plain decoder decides: it takes over, and says what it says.
 
 
