@@ -334,7 +334,9 @@ def _balance(fields: Fields) -> str:
     cells = _words(fields, "daly.balance.cell")
     if not cells:
         return "no cell"
-    return f"cells {cells}  (or, with an active balancer: cell {fields['daly.balance.active_cell']})"
+    active = fields["daly.balance.active_cell"]
+    # 0 is none: there is nothing else that the bytes could mean.
+    return f"cells {cells}" + (f"  (or, with an active balancer: cell {active})" if active else "")
 
 
 _FAULT = "daly.fault."

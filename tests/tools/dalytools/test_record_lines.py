@@ -42,6 +42,19 @@ def test_a_fault_reply_that_nobody_asked_for_names_faults_alone() -> None:
     assert "cell_volt_high_level_1  ! nobody asked" in str([line(record) for record in decode(packets)][1])
 
 
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        ("0100000000000000", "cells 1"),  # byte 1 is 0: no cell by the other reading, which is no alternative
+        ("0108", "cells 1 12  (or, with an active balancer: cell 8)"),
+        ("0000000000008000", "no cell"),
+    ],
+)
+def test_an_active_balancer_is_an_alternative_only_where_it_names_a_cell(data: str, text: str) -> None:
+    (record,) = decode([Packet(1, 0, bytes.fromhex(a5(1, 0x97, data)))])
+    assert line(record).values == text
+
+
 TOLD: dict[str, str] = {
     # heezes: 30000 mAh, 3600 mV; 3800 and 50 mV; 600 A (field notes, a.2)
     "50 00007530 00000e10": "rated capacity setting.rated_capacity 30000 mAh setting.cell_nominal_voltage 3600 mV",
