@@ -201,10 +201,21 @@ take[0x93] = function(bus, board, slot, packet, raw)
     end
   end
   board.state, board.charge, board.discharge, board.mos_in = state, charge, discharge, packet
+  board.switched = nil -- older than this
   if state ~= 0 or charge or discharge or sub(raw, 5, 12) ~= ZEROS then
     board.load_state = state
   end
 end
+
+-- The reply to a switch: the new state, and stale bytes behind it. It is for the next such write's note alone: what
+-- changed (records.md 9) is told of 0x93 by 0x93.
+local function take_switch(_, board, _, packet, raw)
+  local id, on = byte(raw, 3), byte(raw, 5) ~= 0
+  board.switched = board.switched or {}
+  board.switched[id], board.switched[-id] = on, packet
+end
+
+take[0xD9], take[0xDA] = take_switch, take_switch
 
 take[0x94] = function(bus, board, slot, packet, raw)
   local cells, sensors, charger, load = byte(raw, 5, 8)
@@ -269,7 +280,10 @@ function M.note_before(bus, slot, address, id)
     return
   end
   local was, was_in
-  if (id == 0xD9 or id == 0xDA) and board.mos_in then
+  local switched = board.switched
+  if switched and switched[-id] then
+    was, was_in = (switched[id] and "\1" or "\0") .. ("\0"):rep(7), switched[-id]
+  elseif (id == 0xD9 or id == 0xDA) and board.mos_in then
     local on = id == 0xDA and board.charge or id == 0xD9 and board.discharge
     was, was_in = (on and "\1" or "\0") .. ("\0"):rep(7), board.mos_in
   elseif id == 0x21 and board.pack then

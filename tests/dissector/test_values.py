@@ -101,6 +101,37 @@ def test_a_write_says_what_it_would_change(dissect: Dissect, name: str) -> None:
     assert expert(dissect([P(told), P(asked, 5)])[1]) == words
 
 
+def test_a_switch_was_what_the_newest_93_or_answer_to_a_switch_told(dissect: Dissect) -> None:
+    """The answer's byte 0 is the new state (field notes a.3). What changed is told of 93 by 93 (records.md 9)."""
+    on, off = a5(0x40, 0xD9, "01"), a5(0x40, 0xD9, "00")
+    frames = [
+        a5(1, 0x93, "000101"),
+        off,
+        a5(1, 0xD9, "00"),
+        on,  # packet 4: it was switched off
+        off,  # and unanswered; 5
+        a5(0x40, 0xDA, "01"),  # the other switch's answer tells nothing of this one; 6
+        a5(1, 0x93, "000101"),
+        on,  # packet 8: the 93 is newer
+        a5(1, 0xD9, "0055"),  # denied; stale bytes behind the state
+        on,  # packet 10
+        a5(1, 0x93, "000100"),
+    ]
+    rows = dissect([P(frame, at) for at, frame in enumerate(frames)])
+    notes = {number: expert(rows[number - 1]).partition("\x1f")[0] for number in (2, 4, 5, 6, 8, 10)}
+    said = {number: note.partition("says 00)")[2] for number, note in notes.items()}
+    assert said == {
+        2: "; by packet 1, discharge MOS was on",
+        4: "; by packet 3, discharge MOS was off",
+        5: "; the same as in packet 3",
+        6: "; the same as in packet 1",
+        8: "; the same as in packet 7",
+        10: "; by packet 9, discharge MOS was off",
+    }
+    assert [row.get("daly.changed") for row in rows] == [None] * 10 + [["discharge_mos"]]
+    assert rows[10]["daly.changed_from"] == ["7"]
+
+
 def test_writes_stand_out(sessions: dict[str, list[Row]]) -> None:
     assert info(sessions["21 of a real program"][0]) == (
         "WRITE board 1  0x21 Set Clock, SOC: sets clock to 2022-12-13 21:29:39, SOC to 30.0 %  [unanswered]"
