@@ -640,6 +640,18 @@ CASES: dict[str, list[Heard]] = {
     ],
     "61 registers are too few": [told(ALL_D2[:61], 0)],
     "more than 62": [told([*ALL_D2, 0xFFFF], 0, 0, modbus__assumed=True, modbus__absent=0x3E, also=ALL_D2_SHOWN)],
+    # The WiFi module reads 126 (field notes d): 252 bytes, the most that a reply can hold.
+    "126 registers, the most there are": [
+        told([*ALL_D2, *[0] * 64], 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN),
+        told(
+            [*ALL_81, *[0] * 64],
+            1,
+            0,
+            address=0x51,
+            modbus__assumed=True,
+            also={**ALL_81_SHOWN, "state": 0, "mos.charge": False, "mos.discharge": False},
+        ),
+    ],
     "what proves nothing": [
         told(changed(ALL_D2, (0x28, 134)), 0),  # 13.4 V against 13.200: 1.5 %
         told(changed(ALL_D2, (0x31, 0)), 1),

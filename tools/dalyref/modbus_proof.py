@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dalyref import modbus
 from dalyref.register_map import Registers
 
 if TYPE_CHECKING:
@@ -73,11 +74,14 @@ def _81_pack(data: bytes) -> bool:
     )
 
 
+_WHOLE_PACK = range(62, modbus.LARGEST_READ // 2 + 1)
+"""From the least that holds all that is asked, to the most that a reply can hold."""
+
 _CLAIMS: tuple[tuple[bool, range, int, Callable[[bytes], bool]], ...] = (
-    (True, range(62, 126), 0x0000, _d2_pack),
+    (True, _WHOLE_PACK, 0x0000, _d2_pack),
     (True, range(41, 42), 0x0080, _d2_settings),
     (True, range(32, 33), 0x00A9, _d2_texts),
-    (False, range(62, 126), 0x0000, _81_pack),
+    (False, _WHOLE_PACK, 0x0000, _81_pack),
 )
 """Of D2 or of 81, how many registers, where they would begin, the proof."""
 
