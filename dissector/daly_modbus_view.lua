@@ -88,14 +88,14 @@ end
 -- Registers ---------------------------------------------------------------------------------------
 
 -- Each known value among `count` registers from `start`, which stand in raw from offset: call(entry, value, offset).
--- `index`: all of a map, or what writes set.
-local function each_value(index, raw, offset, start, count, call)
+-- `index`: all of a map, or what writes set. `written`: they stand in a write.
+local function each_value(index, raw, offset, start, count, written, call)
   for place = 0, count - 1 do
     local entries = index[start + place]
     for i = 1, entries and #entries or 0 do
       local entry = entries[i]
       if place + entry.count <= count then
-        local value = registers.value(entry, raw, offset + 2 * place + 1)
+        local value = registers.value(entry, raw, offset + 2 * place + 1, written)
         if value ~= nil then
           call(entry, value, offset + 2 * place)
         end
@@ -104,8 +104,8 @@ local function each_value(index, raw, offset, start, count, call)
   end
 end
 
-local function show_values(index, raw, offset, start, count, out)
-  each_value(index, raw, offset, start, count, function(entry, value, at)
+local function show_values(index, raw, offset, start, count, written, out)
+  each_value(index, raw, offset, start, count, written, function(entry, value, at)
     out.value(fields[entry.name], at, 2 * entry.count, value, entry.unit)
   end)
 end
@@ -197,7 +197,7 @@ local function value_words(known, raw, start, count)
       .. " %"
   end
   local list = {}
-  each_value(known.at, raw, REPLY_DATA, start, count, function(entry, value)
+  each_value(known.at, raw, REPLY_DATA, start, count, false, function(entry, value)
     if #list < MOST_VALUES and entry.name:sub(-5) ~= "_sent" then
       list[#list + 1] = quantities.label(entry.name)
         .. " "
@@ -234,7 +234,7 @@ local function write_words(known, raw, offset, start, count, odd)
       sets[#sets + 1] = "command " .. known.commands[start + place]:gsub("_", " ")
     end
   end
-  each_value(known.sets, raw, offset, start, count, function(entry, value, at)
+  each_value(known.sets, raw, offset, start, count, true, function(entry, value, at)
     local label = quantities.label(entry.name)
     local said = quantities.words(entry.kind, value, entry.unit, entry.names)
     sets[#sets + 1] = entry.kind == "switch" and format("switches %s %s", label, said)
@@ -318,7 +318,7 @@ local function request(item, raw, slot, results, wanted, again, out)
           out.made(fields.command, known.commands[register])
         end
       end
-      show_values(known.sets, raw, offset, start, count, out)
+      show_values(known.sets, raw, offset, start, count, true, out)
       show_raw(raw, offset, start, count, out)
     end
   end
@@ -372,7 +372,7 @@ local function read_reply(item, raw, slot, results, wanted, out)
     out.made(fields["modbus.count"], count)
     show_cells(known, raw, start, count, cells, out)
     show_sensors(known, raw, start, count, sensors, out)
-    show_values(known.at, raw, REPLY_DATA, start, count, out)
+    show_values(known.at, raw, REPLY_DATA, start, count, false, out)
     show_faults(known, raw, start, count, odd, out)
     show_raw(raw, REPLY_DATA, start, count, out)
     for place = 0, count - 1 do

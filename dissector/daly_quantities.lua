@@ -63,8 +63,10 @@ M.read = {
   hundreds = function(raw, at)
     return number(raw, at, 2) * 100
   end,
+  -- Of a time to sleep: FFFF is "never", no time.
   tens = function(raw, at)
-    return number(raw, at, 2) * 10
+    local value = number(raw, at, 2)
+    return value ~= 0xFFFF and value * 10 or nil
   end,
   temperature = function(raw, at, length)
     return number(raw, at, length) - 40

@@ -265,15 +265,20 @@ M.MAPS = {
   }),
 }
 
---- The value of an entry whose first register stands at raw[at], or nil where it is none.
-function M.value(entry, raw, at)
+--- The value of an entry whose first register stands at raw[at], or nil where it is none. `written`: a host writes it,
+-- so FFFF is a value; in what a board tells it is a register that the board does not have.
+function M.value(entry, raw, at, written)
   local count = entry.count
   if count == 1 then
     local high, low = byte(raw, at, at + 1)
-    if (high == 0xFF and low == 0xFF) or (entry.small and high ~= 0) or (entry.not_zero and high + low == 0) then
+    if
+      (high == 0xFF and low == 0xFF and not written)
+      or (entry.small and high ~= 0)
+      or (entry.not_zero and high + low == 0)
+    then
       return nil
     end
-  elseif not entry.padded then
+  elseif not entry.padded and not written then
     for i = 0, count - 1 do
       if sub(raw, at + 2 * i, at + 2 * i + 1) == "\xFF\xFF" then
         return nil

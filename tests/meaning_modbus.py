@@ -20,6 +20,7 @@ modbus.absent changed changed_from contradiction contradicts fault_raised fault_
 cell.voltage temperature cells.voltage cells.count sensors.temperature sensors.average soc state cell_count
 sensor_count mos.charge mos.discharge setting.soc setting.mos_charge setting.mos_discharge setting.cell_high_1
 setting.balancer clock command password software_version setting.sleep setting.balance_current
+setting.rated_capacity
 """
 _LIMITS = """
 cell_high_2 cell_low_1 cell_low_2 pack_high_1 pack_high_2 pack_low_1 pack_low_2 charge_current_1 charge_current_2
@@ -116,6 +117,12 @@ def writes(frame: str, register: int, value: int, at: float, **more: object) -> 
     return Heard(
         frame, at, {"direction": 1, "write": True, "modbus.register": register, "modbus.value": value, **dotted(more)}
     )
+
+
+def written(values: list[int], register: int, at: float, address: int = 0xD2, **more: object) -> Heard:
+    """A write of many, and what it shows."""
+    expect = {"direction": 1, "write": True, "modbus.register": register, "modbus.count": len(values)}
+    return Heard(many(register, *values, address=address), at, expect | {"modbus.value": values} | dotted(more))
 
 
 def echoes(frame: str, register: int, value: int, at: float, **more: object) -> Heard:
@@ -239,6 +246,7 @@ LIMITS_D2 = [
 ]
 """80 to A8."""
 LIMITS_D2_TOLD = {
+    "setting.rated_capacity": 100000,
     "setting.sleep": 3600,
     "setting.cell_high_1": 3500,
     "setting.cell_high_2": 3600,
@@ -550,10 +558,21 @@ CASES: dict[str, list[Heard]] = {
     ],
     "what a write can't set": [
         writes(one(0x8B, 3500), 0x8B, 3500, 0, setting__cell_high_1=3500),
-        writes(one(0x8B, 0xFFFF), 0x8B, 0xFFFF, 0.1),
         writes(one(0x2A, 500), 0x2A, 500, 0.2),
         writes(one(0xD4, 0x180B), 0xD4, 0x180B, 0.3),
         writes(one(0xCF, 1), 0xCF, 1, 0.4, setting__balancer=True),
+        writes(one(0x97, 0xFFFF), 0x97, 0xFFFF, 0.5),  # no temperature has a high byte
+        writes(one(0x115, 0xFFFF, 0x81), 0x115, 0xFFFF, 0.6),  # never, which is no time
+    ],
+    # That FFFF is no register is a board's answer (field notes d); who writes it means it.
+    "FFFF is a value in a write": [
+        writes(one(0xA5, 0xFFFF), 0xA5, 0xFFFF, 0, setting__mos_charge=True),
+        writes(one(0xA7, 0xFFFF), 0xA7, 0xFFFF, 0.1, setting__soc=6553.5),
+        writes(one(0x8B, 0xFFFF), 0x8B, 0xFFFF, 0.2, setting__cell_high_1=65535),
+        written([0x0001, 0xFFFF], 0x109, 0.3, 0x81, setting__rated_capacity=131071),
+        written([0xFFFF, 0xFFFF], 0x109, 0.4, 0x81, setting__rated_capacity=4294967295),
+        written([0xFFFF, 0xFFFF], 0xCC, 0.5),  # a date of FF is none
+        written([0x180B, 0x0709, 0xFFFF], 0xD4, 0.6, clock="2024-11-07 09:255:255"),  # as sent, no calendar is asked
     ],
     "a password": [
         asks(0xC9, 3, 0),
@@ -642,7 +661,7 @@ CASES: dict[str, list[Heard]] = {
     "more than 62": [told([*ALL_D2, 0xFFFF], 0, 0, modbus__assumed=True, modbus__absent=0x3E, also=ALL_D2_SHOWN)],
     # The WiFi module reads 126 (field notes d): 252 bytes, the most that a reply can hold.
     "126 registers, the most there are": [
-        told([*ALL_D2, *[0] * 64], 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN),
+        told(WIFI_D2, 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN),
         told(
             [*ALL_81, *[0] * 64],
             1,

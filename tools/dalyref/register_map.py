@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """How the registers of a dialect are read (docs/protocol.md, d): ``registers_d2`` and ``registers_81`` have the tables.
 
-A value whose registers are not all there, or of which one reads FFFF (a register that the board does not have), is
-none; but texts, where FF is padding.
+A value whose registers are not all there is none. In a reply nor is one of which a register reads FFFF (the board does
+not have it), but texts, where FF is padding. In a write FFFF is a value: only a board says that it has no register.
 """
 
 from __future__ import annotations
@@ -117,14 +117,12 @@ class Registers:
         """Return the numbers of the registers that read FFFF."""
         return [self.start + at for at in range(self.count) if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
 
-    def named(self, rows: Iterable[Row]) -> Fields:
-        """Return the values that the rows of a table name."""
+    def named(self, rows: Iterable[Row], *, written: bool = False) -> Fields:
+        """Return the values that the rows of a table name. written: as a host writes them, not as a board has them."""
         fields: Fields = {}
         for first, last, name, meaning in rows:
             raw = self.raw(first, last)
-            if raw is None:
-                continue
-            if meaning not in _PADDED and any(raw[at : at + 2] == b"\xff\xff" for at in range(0, len(raw), 2)):
+            if raw is None or (not written and _lacks(raw, meaning)):
                 continue
             value = meaning(raw)
             if value is not None:
@@ -132,9 +130,14 @@ class Registers:
         return fields
 
 
+def _lacks(raw: bytes, meaning: Meaning) -> bool:
+    """Tell whether a reply with these registers has not what they mean."""
+    return meaning not in _PADDED and any(raw[at : at + 2] == b"\xff\xff" for at in range(0, len(raw), 2))
+
+
 def would_set(registers: Registers, table: RegisterMap) -> Fields:
     """Return what a write of these registers asks for."""
-    fields = registers.named(table.settings)
+    fields = registers.named(table.settings, written=True)
     if table.commands:
         put(fields, "daly.command", [name for register, name in table.commands.items() if register in registers])
     return fields

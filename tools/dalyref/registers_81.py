@@ -55,8 +55,9 @@ TOLD: tuple[Row, ...] = (
 )
 
 
-def _tens_of_seconds(raw: bytes) -> int:
-    return int.from_bytes(raw) * 10
+def _tens_of_seconds(raw: bytes) -> int | None:
+    """Give a time, s, sent in tens; none where it is FFFF, which a write has for "never"."""
+    return None if raw == b"\xff\xff" else int.from_bytes(raw) * 10
 
 
 def _limit(register: int, name: str, meaning: Meaning) -> tuple[Row, Row]:
