@@ -376,7 +376,7 @@ local function read_reply(item, raw, slot, results, wanted, out)
     show_faults(known, raw, start, count, odd, out)
     show_raw(raw, REPLY_DATA, start, count, out)
     for place = 0, count - 1 do
-      if registers.register(raw, REPLY_DATA + 1, start, count, start + place) == 0xFFFF then
+      if registers.is_absent(known, raw, REPLY_DATA + 1, start, count, start + place) then
         out.value(fields["modbus.absent"], REPLY_DATA + 2 * place, 2, start + place)
       end
     end

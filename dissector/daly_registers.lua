@@ -211,7 +211,7 @@ local NAMES = { ["state"] = settings.NAMES.state, ["setting.battery_type"] = set
 local PADDED = { text = true, reversed = true }
 
 local function map(dialect, list, more)
-  more.at, more.sets = {}, {}
+  more.at, more.sets, more.other_half = {}, {}, {}
   for i = 1, #list do
     local name, register, count, kind, unit, sets = table.unpack(list[i], 1, 6)
     local entry = {
@@ -225,7 +225,11 @@ local function map(dialect, list, more)
       small = BYTES[name] or kind == "temperature",
       not_zero = NOT_ZERO[dialect][name],
       padded = PADDED[kind],
+      wide = count == 2 and kind == "number", -- half of it may well be FFFF
     }
+    if entry.wide then
+      more.other_half[register], more.other_half[register + 1] = register + 1, register
+    end
     for _, index in ipairs({ more.at, sets and more.sets or {} }) do
       index[register] = index[register] or {}
       table.insert(index[register], entry)
@@ -278,6 +282,10 @@ function M.value(entry, raw, at, written)
     then
       return nil
     end
+  elseif entry.wide and not written then
+    if sub(raw, at, at + 3) == "\xFF\xFF\xFF\xFF" then
+      return nil
+    end
   elseif not entry.padded and not written then
     for i = 0, count - 1 do
       if sub(raw, at + 2 * i, at + 2 * i + 1) == "\xFF\xFF" then
@@ -297,6 +305,16 @@ function M.register(raw, at, start, count, register)
   end
   local high, low = byte(raw, at + 2 * place, at + 2 * place + 1)
   return high * 256 + low
+end
+
+--- Whether one of a frame's registers, as M.register has them, is none that the board has: it reads FFFF, and is not
+-- half of a number.
+function M.is_absent(known, raw, at, start, count, register)
+  if M.register(raw, at, start, count, register) ~= 0xFFFF then
+    return false
+  end
+  local other = known.other_half[register]
+  return (other and M.register(raw, at, start, count, other) or 0xFFFF) == 0xFFFF
 end
 
 --- Which cell or sensor a register holds, by a map's `cells` or `sensors`; nil where it is none.

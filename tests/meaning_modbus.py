@@ -20,7 +20,7 @@ modbus.absent changed changed_from contradiction contradicts fault_raised fault_
 cell.voltage temperature cells.voltage cells.count sensors.temperature sensors.average soc state cell_count
 sensor_count mos.charge mos.discharge setting.soc setting.mos_charge setting.mos_discharge setting.cell_high_1
 setting.balancer clock command password software_version setting.sleep setting.balance_current
-setting.rated_capacity
+setting.rated_capacity uptime.total uptime.since_start
 """
 _LIMITS = """
 cell_high_2 cell_low_1 cell_low_2 pack_high_1 pack_high_2 pack_low_1 pack_low_2 charge_current_1 charge_current_2
@@ -584,6 +584,24 @@ CASES: dict[str, list[Heard]] = {
     "registers that are not there": [
         asks(0x29, 3, 0),
         told([0xFFFF, 0xFFFF, 3300], 0.05, 0x29, 1, modbus__absent=[0x29, 0x2A]),
+    ],
+    # Of a u32 FFFF is one half: 0001 FFFF is 131071. Only where both read so is it not there.
+    "numbers of two registers": [
+        asks(0x109, 2, 0, 0x81),
+        told([0x0001, 0xFFFF], 0.05, 0x109, 1, 0x51, setting__rated_capacity=131071),
+        asks(0x109, 2, 0.1, 0x81),
+        told([0xFFFF, 0x0001], 0.15, 0x109, 3, 0x51, setting__rated_capacity=4294901761),
+        asks(0x109, 2, 0.2, 0x81),
+        told([0xFFFF, 0xFFFF], 0.25, 0x109, 5, 0x51, modbus__absent=[0x109, 0x10A]),
+        asks(0xA9, 4, 0.3, 0x81),
+        told([0x0001, 0xFFFF, 0xFFFF, 0xFFFF], 0.35, 0xA9, 7, 0x51, uptime__total=131071, modbus__absent=[0xAB, 0xAC]),
+        asks(0xAA, 2, 0.4, 0x81),  # two halves
+        told([0xFFFF, 0x0001], 0.45, 0xAA, 9, 0x51, modbus__absent=0xAA),
+        asks(0xA9, 4, 0.5, 0x81),
+        told([0, 0xFFFF, 1, 0], 0.55, 0xA9, 11, 0x51, uptime__total=65535, uptime__since_start=65536),
+        # A date or a clock is no number: FF is no month.
+        asks(0x129, 2, 0.6, 0x81),
+        told([0xFFFF, 0x0100], 0.65, 0x129, 13, 0x51, modbus__absent=0x129),
     ],
     "cells without a count: all, and no table": [
         asks(0x00, 3, 0),

@@ -93,7 +93,7 @@ class ModbusBus:
         fields, table = slate.fields, _table(frame)
         fields["daly.modbus.register"] = registers.start
         fields["daly.modbus.count"] = registers.count
-        put(fields, "daly.modbus.absent", registers.absent())
+        put(fields, "daly.modbus.absent", registers.absent(table))
         board = self._boards.get(frame.address)
         if board is None:
             board = self._boards[frame.address] = ModbusBoard(table)

@@ -2,7 +2,8 @@
 """How the registers of a dialect are read (docs/protocol.md, d): ``registers_d2`` and ``registers_81`` have the tables.
 
 A value whose registers are not all there is none. In a reply nor is one of which a register reads FFFF (the board does
-not have it), but texts, where FF is padding. In a write FFFF is a value: only a board says that it has no register.
+not have it), but texts, where FF is padding, and numbers of two registers, which must both read so. In a write FFFF is
+a value: only a board says that it has no register.
 """
 
 from __future__ import annotations
@@ -113,9 +114,17 @@ class Registers:
         value = ABSENT if raw is None else int.from_bytes(raw)
         return None if value == ABSENT else value
 
-    def absent(self) -> list[int]:
-        """Return the numbers of the registers that read FFFF."""
-        return [self.start + at for at in range(self.count) if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
+    def absent(self, table: RegisterMap) -> list[int]:
+        """Return the numbers of the registers that read FFFF, but those that are part of a longer number."""
+        found = [self.start + at for at in range(self.count) if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
+        if not found:
+            return found
+        part: set[int] = set()
+        for first, last, _, meaning in (*table.told, *table.settings):
+            raw = self.raw(first, last) if first != last and meaning is quantities.number else None
+            if raw is not None and not _lacks(raw, meaning):
+                part.update(range(first, last + 1))
+        return [register for register in found if register not in part]
 
     def named(self, rows: Iterable[Row], *, written: bool = False) -> Fields:
         """Return the values that the rows of a table name. written: as a host writes them, not as a board has them."""
@@ -132,7 +141,10 @@ class Registers:
 
 def _lacks(raw: bytes, meaning: Meaning) -> bool:
     """Tell whether a reply with these registers has not what they mean."""
-    return meaning not in _PADDED and any(raw[at : at + 2] == b"\xff\xff" for at in range(0, len(raw), 2))
+    if meaning in _PADDED:
+        return False
+    lacking = [raw[at : at + 2] == b"\xff\xff" for at in range(0, len(raw), 2)]
+    return all(lacking) if meaning is quantities.number else any(lacking)
 
 
 def would_set(registers: Registers, table: RegisterMap) -> Fields:
