@@ -196,7 +196,7 @@ local BYTES = {
 
 -- None where the register is 0.
 local NOT_ZERO = {
-  d2 = { ["temperature.mos"] = true, ["temperature.board"] = true },
+  d2 = { ["temperature.mos"] = true, ["temperature.board"] = true, ["balance.current"] = true },
   ["81"] = {
     ["temperature.mos"] = true,
     ["temperature.board"] = true,

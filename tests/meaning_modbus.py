@@ -20,7 +20,7 @@ modbus.absent changed changed_from contradiction contradicts fault_raised fault_
 cell.voltage temperature cells.voltage cells.count sensors.temperature sensors.average soc state cell_count
 sensor_count mos.charge mos.discharge setting.soc setting.mos_charge setting.mos_discharge setting.cell_high_1
 setting.balancer clock command password software_version setting.sleep setting.balance_current
-setting.rated_capacity uptime.total uptime.since_start
+setting.rated_capacity uptime.total uptime.since_start balance.current
 """
 _LIMITS = """
 cell_high_2 cell_low_1 cell_low_2 pack_high_1 pack_high_2 pack_low_1 pack_low_2 charge_current_1 charge_current_2
@@ -585,6 +585,19 @@ CASES: dict[str, list[Heard]] = {
         asks(0x29, 3, 0),
         told([0xFFFF, 0xFFFF, 3300], 0.05, 0x29, 1, modbus__absent=[0x29, 0x2A]),
     ],
+    # At rest a board tells 30000 (field notes d.1): 0 is none, not -30 A.
+    "a balance current of 0 is none": [
+        asks(0x40, 1, 0),
+        told([0], 0.05, 0x40, 1),
+        asks(0x40, 1, 0.1),
+        told([30000], 0.15, 0x40, 3, balance__current=0),
+        asks(0x40, 1, 0.2),
+        told([1], 0.25, 0x40, 5, balance__current=-29999),
+        asks(0x4E, 1, 0.3, 0x81),
+        told([0], 0.35, 0x4E, 7, 0x51),
+        asks(0x4E, 1, 0.4, 0x81),
+        told([30100], 0.45, 0x4E, 9, 0x51, balance__current=100),
+    ],
     # Of a u32 FFFF is one half: 0001 FFFF is 131071. Only where both read so is it not there.
     "numbers of two registers": [
         asks(0x109, 2, 0, 0x81),
@@ -679,7 +692,7 @@ CASES: dict[str, list[Heard]] = {
     "more than 62": [told([*ALL_D2, 0xFFFF], 0, 0, modbus__assumed=True, modbus__absent=0x3E, also=ALL_D2_SHOWN)],
     # The WiFi module reads 126 (field notes d): 252 bytes, the most that a reply can hold.
     "126 registers, the most there are": [
-        told(WIFI_D2, 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN),
+        told(WIFI_D2, 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN, balance__current=0),
         told(
             [*ALL_81, *[0] * 64],
             1,
@@ -732,7 +745,7 @@ CASES: dict[str, list[Heard]] = {
     ],
     "the WiFi module asks for 126 at once": [
         Heard("d2030000007ed649", 0, {"direction": 1, "modbus.register": 0, "modbus.count": 126}),
-        told(WIFI_D2, 0.3, 0, 1, also=ALL_D2_SHOWN),
+        told(WIFI_D2, 0.3, 0, 1, also=ALL_D2_SHOWN, balance__current=0),
     ],
     "81 is not read as D2": [told(ALL_81, 0), told(ALL_D2, 1, address=0x51)],
     "limits prove themselves": [

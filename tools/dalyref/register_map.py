@@ -46,14 +46,9 @@ def celsius_not_0(raw: bytes) -> int | None:
     return celsius(raw) if any(raw) else None
 
 
-def milliamperes(raw: bytes) -> int:
-    """Give a current, mA, sent with offset 30000."""
-    return int.from_bytes(raw) - 30000
-
-
 def milliamperes_not_0(raw: bytes) -> int | None:
-    """Give a current in the same way; none where it is 0."""
-    return milliamperes(raw) if any(raw) else None
+    """Give a current, mA, sent with offset 30000; none where it is 0, for at rest boards tell 30000."""
+    return int.from_bytes(raw) - 30000 if any(raw) else None
 
 
 def backward(raw: bytes) -> str | None:
