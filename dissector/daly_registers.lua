@@ -195,6 +195,7 @@ local BYTES = {
 }
 
 -- None where the register is 0.
+-- Of temperatures 00FF is none either: no sensor.
 local NOT_ZERO = {
   d2 = { ["temperature.mos"] = true, ["temperature.board"] = true, ["balance.current"] = true },
   ["81"] = {
@@ -224,6 +225,7 @@ local function map(dialect, list, more)
       names = NAMES[name],
       small = BYTES[name] or kind == "temperature",
       not_zero = NOT_ZERO[dialect][name],
+      sensor = NOT_ZERO[dialect][name] and kind == "temperature",
       padded = PADDED[kind],
       wide = count == 2 and kind == "number", -- half of it may well be FFFF
     }
@@ -279,6 +281,7 @@ function M.value(entry, raw, at, written)
       (high == 0xFF and low == 0xFF and not written)
       or (entry.small and high ~= 0)
       or (entry.not_zero and high + low == 0)
+      or (entry.sensor and low == 0xFF)
     then
       return nil
     end

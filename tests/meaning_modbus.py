@@ -21,6 +21,7 @@ cell.voltage temperature cells.voltage cells.count sensors.temperature sensors.a
 sensor_count mos.charge mos.discharge setting.soc setting.mos_charge setting.mos_discharge setting.cell_high_1
 setting.balancer clock command password software_version setting.sleep setting.balance_current
 setting.rated_capacity uptime.total uptime.since_start balance.current
+temperature.mos temperature.board temperature.heater
 """
 _LIMITS = """
 cell_high_2 cell_low_1 cell_low_2 pack_high_1 pack_high_2 pack_low_1 pack_low_2 charge_current_1 charge_current_2
@@ -275,6 +276,7 @@ LIMITS_D2_TOLD = {
 }
 WIFI_D2 = [*ALL_D2, 0, 0, 30000, 0, 65, 62, *[0] * 58]
 """00 to 7D, 126 registers, as the WiFi module asks for them (field notes d): no balance current, MOS 25 C."""
+WIFI_D2_SHOWN = {"balance.current": 0, "temperature.mos": 25, "temperature.board": 22}
 VERSION_D2 = [0x3130, 0x5F32, *[0] * 14, *[0] * 16]
 """A9 to C8: "10_2" as sent."""
 
@@ -598,6 +600,19 @@ CASES: dict[str, list[Heard]] = {
         asks(0x4E, 1, 0.4, 0x81),
         told([30100], 0.45, 0x4E, 9, 0x51, balance__current=100),
     ],
+    # Raw 0 and raw FF are no sensor (field notes a.92, d.1).
+    "MOS, board and heater without a sensor": [
+        asks(0x42, 2, 0),
+        told([0x00FF, 0x00FE], 0.05, 0x42, 1, temperature__board=214),
+        asks(0x42, 2, 0.1),
+        told([0, 0x00FF], 0.15, 0x42, 3),
+        asks(0x42, 2, 0.2),
+        told([1, 0x01FF], 0.25, 0x42, 5, temperature__mos=-39),
+        asks(0x5A, 3, 0.3, 0x81),
+        told([0x00FF, 64, 0x00FF], 0.35, 0x5A, 7, 0x51, temperature__board=24),
+        asks(0x5A, 3, 0.4, 0x81),
+        told([65, 0x00FF, 0], 0.45, 0x5A, 9, 0x51, temperature__mos=25),
+    ],
     # Of a u32 FFFF is one half: 0001 FFFF is 131071. Only where both read so is it not there.
     "numbers of two registers": [
         asks(0x109, 2, 0, 0x81),
@@ -692,7 +707,7 @@ CASES: dict[str, list[Heard]] = {
     "more than 62": [told([*ALL_D2, 0xFFFF], 0, 0, modbus__assumed=True, modbus__absent=0x3E, also=ALL_D2_SHOWN)],
     # The WiFi module reads 126 (field notes d): 252 bytes, the most that a reply can hold.
     "126 registers, the most there are": [
-        told(WIFI_D2, 0, 0, modbus__assumed=True, also=ALL_D2_SHOWN, balance__current=0),
+        told(WIFI_D2, 0, 0, modbus__assumed=True, also={**ALL_D2_SHOWN, **WIFI_D2_SHOWN}),
         told(
             [*ALL_81, *[0] * 64],
             1,
@@ -745,7 +760,7 @@ CASES: dict[str, list[Heard]] = {
     ],
     "the WiFi module asks for 126 at once": [
         Heard("d2030000007ed649", 0, {"direction": 1, "modbus.register": 0, "modbus.count": 126}),
-        told(WIFI_D2, 0.3, 0, 1, also=ALL_D2_SHOWN, balance__current=0),
+        told(WIFI_D2, 0.3, 0, 1, also={**ALL_D2_SHOWN, **WIFI_D2_SHOWN}),
     ],
     "81 is not read as D2": [told(ALL_81, 0), told(ALL_D2, 1, address=0x51)],
     "limits prove themselves": [

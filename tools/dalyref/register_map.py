@@ -41,9 +41,9 @@ def celsius(raw: bytes) -> int | None:
     return None if value is None else value - 40
 
 
-def celsius_not_0(raw: bytes) -> int | None:
-    """Give a temperature in the same way; none where it is 0 too."""
-    return celsius(raw) if any(raw) else None
+def celsius_of_sensor(raw: bytes) -> int | None:
+    """Give a temperature in the same way; none where raw is 0 or FF too, which is no sensor."""
+    return None if small(raw) in (0, 0xFF) else celsius(raw)
 
 
 def milliamperes_not_0(raw: bytes) -> int | None:

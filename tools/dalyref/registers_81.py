@@ -9,7 +9,7 @@ Not read, for sources disagree: 3B, 4F-51, 64; for nobody knows the order of the
 from __future__ import annotations
 
 from dalyref.quantities import Meaning, amperes, clock, date, hundreds, number, switch, tenths, text
-from dalyref.register_map import RegisterMap, Row, celsius, celsius_not_0, milliamperes_not_0, small
+from dalyref.register_map import RegisterMap, Row, celsius, celsius_of_sensor, milliamperes_not_0, small
 
 TOLD: tuple[Row, ...] = (
     (0x38, 0x38, "pack.voltage", tenths),  # V
@@ -41,9 +41,9 @@ TOLD: tuple[Row, ...] = (
     (0x57, 0x57, "cell.average_voltage", number),  # mV
     (0x58, 0x58, "power", number),  # W
     (0x59, 0x59, "energy", number),  # Wh
-    (0x5A, 0x5A, "temperature.mos", celsius_not_0),
-    (0x5B, 0x5B, "temperature.board", celsius_not_0),
-    (0x5C, 0x5C, "temperature.heater", celsius_not_0),
+    (0x5A, 0x5A, "temperature.mos", celsius_of_sensor),
+    (0x5B, 0x5B, "temperature.board", celsius_of_sensor),
+    (0x5C, 0x5C, "temperature.heater", celsius_of_sensor),
     (0x5E, 0x5E, "mileage", tenths),  # km
     (0x61, 0x63, "clock", clock),
     (0xA9, 0xAA, "uptime.total", number),  # s, of its life

@@ -9,7 +9,7 @@ Not read, for sources disagree: 3E, 57-69.
 from __future__ import annotations
 
 from dalyref.quantities import amperes, clock, date, hundreds, number, switch, tenths, text
-from dalyref.register_map import RegisterMap, Row, backward, celsius, celsius_not_0, milliamperes_not_0, small
+from dalyref.register_map import RegisterMap, Row, backward, celsius, celsius_of_sensor, milliamperes_not_0, small
 
 TOLD: tuple[Row, ...] = (
     (0x28, 0x28, "pack.voltage", tenths),  # V
@@ -32,8 +32,8 @@ TOLD: tuple[Row, ...] = (
     (0x38, 0x38, "cell.difference", number),  # mV
     (0x39, 0x39, "power", number),  # W
     (0x40, 0x40, "balance.current", milliamperes_not_0),
-    (0x42, 0x42, "temperature.mos", celsius_not_0),
-    (0x43, 0x43, "temperature.board", celsius_not_0),
+    (0x42, 0x42, "temperature.mos", celsius_of_sensor),
+    (0x43, 0x43, "temperature.board", celsius_of_sensor),
     (0xA9, 0xB0, "software_version", backward),
     (0xA9, 0xB0, "software_version_sent", text),
     (0xB1, 0xB8, "hardware_version", backward),
