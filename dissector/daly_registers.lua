@@ -19,6 +19,9 @@ local SETS = true
 --- The highest value of a cell (FFFF is none) and of a sensor (of one byte, offset 40).
 M.HIGHEST_CELL, M.HIGHEST_SENSOR = 0xFFFE, 0xFF
 
+--- The last register that can be named.
+M.LAST = 0xFFFF
+
 -- stylua: ignore
 local D2 = {
   { "pack.voltage",                    0x28, 1, "tenth", " V" },
@@ -311,9 +314,9 @@ function M.register(raw, at, start, count, register)
 end
 
 --- Whether one of a frame's registers, as M.register has them, is none that the board has: it reads FFFF, and is not
--- half of a number.
+-- half of a number. There are none behind FFFF, though a reply may have words for them.
 function M.is_absent(known, raw, at, start, count, register)
-  if M.register(raw, at, start, count, register) ~= 0xFFFF then
+  if register > M.LAST or M.register(raw, at, start, count, register) ~= 0xFFFF then
     return false
   end
   local other = known.other_half[register]

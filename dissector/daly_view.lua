@@ -160,7 +160,7 @@ function out.registers(field, first, count, start, value)
   for place = 0, count - 1 do
     local item = add(branch, field, range(tvb, at + 4 + first + 2 * place, 2))
     local raw = value(place)
-    if start then
+    if start and start + place <= 0xFFFF then -- behind it there are none
       set_text(item, format("Register %04X: %d (0x%04X)", start + place, raw, raw))
     end
   end

@@ -613,6 +613,14 @@ CASES: dict[str, list[Heard]] = {
         asks(0x5A, 3, 0.4, 0x81),
         told([65, 0x00FF, 0], 0.45, 0x5A, 9, 0x51, temperature__mos=25),
     ],
+    "there are no registers behind FFFF": [
+        asks(0xFFFF, 2, 0, 0x81),
+        told([0xFFFF, 0xFFFF], 0.05, 0xFFFF, 1, 0x51, modbus__absent=0xFFFF),
+        asks(0xFFFE, 4, 0.1),
+        told([0xFFFF, 1, 0xFFFF, 3300], 0.15, 0xFFFE, 3, modbus__absent=0xFFFE),
+        asks(0xFFFF, 3, 0.2),  # cell 1 is not what follows
+        told([1, 3300, 3301], 0.25, 0xFFFF, 5),
+    ],
     # Of a u32 FFFF is one half: 0001 FFFF is 131071. Only where both read so is it not there.
     "numbers of two registers": [
         asks(0x109, 2, 0, 0x81),

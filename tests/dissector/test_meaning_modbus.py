@@ -3,10 +3,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 from tests.dissector.dissection import Dissect, P, Row
 from tests.dissector.test_meaning import as_list, plain
-from tests.meaning_modbus import CASES, watched
+from tests.dissector.test_statistics import capture
+from tests.meaning_modbus import CASES, brings, read, watched
+
+if TYPE_CHECKING:
+    from dalytools.tshark import Tshark
 
 PACKETS = ("request_in", "late_to", "changed_from", "contradicts")
 """Numbers of packets, which a case counts from its own first."""
@@ -56,3 +62,10 @@ def test_meaning(sessions: dict[str, tuple[int, list[Row]]], name: str) -> None:
             if field in row and field != f"daly.{BY_THE_END}"
         }
         assert seen == expected, f"packet {number}"
+
+
+def test_registers_behind_ffff_have_no_number(tshark: Tshark) -> None:
+    path = capture(tshark, [P(read(0xFFFF, 2, 0x81), 0), P(brings(1, 2, address=0x51), 0.05)])
+    shown = tshark.run("-r", str(path), "-V").stdout.decode()
+    assert "Register FFFF: 1 " in shown
+    assert "Register 1000" not in shown

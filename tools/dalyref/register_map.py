@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from dalyref.values import Fields
 
 ABSENT = 0xFFFF
+_LAST = 0xFFFF
+"""The last register that can be named."""
 
 Row: TypeAlias = tuple[int, int, str, Meaning]
 """First register, last register, field, meaning."""
@@ -110,8 +112,12 @@ class Registers:
         return None if value == ABSENT else value
 
     def absent(self, table: RegisterMap) -> list[int]:
-        """Return the numbers of the registers that read FFFF, but those that are part of a longer number."""
-        found = [self.start + at for at in range(self.count) if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
+        """Return the numbers of the registers that read FFFF, but those that are part of a longer number.
+
+        There are none behind FFFF, though a reply may have words for them.
+        """
+        there = range(min(self.count, _LAST + 1 - self.start))
+        found = [self.start + at for at in there if self.data[2 * at : 2 * at + 2] == b"\xff\xff"]
         if not found:
             return found
         part: set[int] = set()
