@@ -226,12 +226,27 @@ local function with_values(raw, offset, count)
   return concat(list, " ") .. (count > #list and " ..." or "")
 end
 
+-- What is to be said of a write that sets nothing we can read: not of settings, of half a value, or to what is none.
+local function unread_words(known, raw, offset, start, count)
+  local named = false
+  for register = start, start + count - 1 do
+    named = named or registers.is_named(known, register)
+  end
+  local why = named and "no setting that we know" or "which no list names"
+  return format("%s, %s, to %s", plural(count), why, with_values(raw, offset, count))
+end
+
 -- What a write would change: short words, and those of the expert note.
 local function write_words(known, raw, offset, start, count, odd)
   local sets, before = {}, {}
   for place = 0, count - 1 do
     if known.commands[start + place] then
       sets[#sets + 1] = "command " .. known.commands[start + place]:gsub("_", " ")
+    end
+    local entries = known.sets[start + place]
+    local value = registers.register(raw, offset + 1, start, count, start + place)
+    if entries and entries[1].kind == "tens" and value == 0xFFFF then
+      sets[#sets + 1] = format("sets %s to never", quantities.label(entries[1].name))
     end
   end
   each_value(known.sets, raw, offset, start, count, true, function(entry, value, at)
@@ -253,7 +268,7 @@ local function write_words(known, raw, offset, start, count, odd)
     end
   end)
   if #sets == 0 then
-    sets[1] = format("%s, which no list names, to %s", plural(count), with_values(raw, offset, count))
+    sets[1] = unread_words(known, raw, offset, start, count)
   end
   local text = concat(sets, ", ")
   if #before > 0 then

@@ -215,7 +215,7 @@ local NAMES = { ["state"] = settings.NAMES.state, ["setting.battery_type"] = set
 local PADDED = { text = true, reversed = true }
 
 local function map(dialect, list, more)
-  more.at, more.sets, more.other_half = {}, {}, {}
+  more.at, more.sets, more.other_half, more.named = {}, {}, {}, {}
   for i = 1, #list do
     local name, register, count, kind, unit, sets = table.unpack(list[i], 1, 6)
     local entry = {
@@ -234,6 +234,9 @@ local function map(dialect, list, more)
     }
     if entry.wide then
       more.other_half[register], more.other_half[register + 1] = register + 1, register
+    end
+    for place = register, register + count - 1 do
+      more.named[place] = true
     end
     for _, index in ipairs({ more.at, sets and more.sets or {} }) do
       index[register] = index[register] or {}
@@ -321,6 +324,15 @@ function M.is_absent(known, raw, at, start, count, register)
   end
   local other = known.other_half[register]
   return (other and M.register(raw, at, start, count, other) or 0xFFFF) == 0xFFFF
+end
+
+--- Whether a map says what a register holds, or what it is part of.
+function M.is_named(known, register)
+  local faults = known.faults
+  return known.named[register]
+    or M.number_of(known.cells, register) ~= nil
+    or M.number_of(known.sensors, register) ~= nil
+    or (faults ~= nil and register >= faults and register < faults + 4)
 end
 
 --- Which cell or sensor a register holds, by a map's `cells` or `sensors`; nil where it is none.

@@ -6,10 +6,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
-from tests.dissector.dissection import Dissect, P, Row
+from tests.dissector.dissection import Dissect, P, Row, expert
 from tests.dissector.test_meaning import as_list, plain
 from tests.dissector.test_statistics import capture
-from tests.meaning_modbus import CASES, brings, read, watched
+from tests.meaning_modbus import CASES, brings, many, one, read, watched
 
 if TYPE_CHECKING:
     from dalytools.tshark import Tshark
@@ -69,3 +69,29 @@ def test_registers_behind_ffff_have_no_number(tshark: Tshark) -> None:
     shown = tshark.run("-r", str(path), "-V").stdout.decode()
     assert "Register FFFF: 1 " in shown
     assert "Register 1000" not in shown
+
+
+# What the note of a write says. "No list names" is said of registers that docs/protocol.md, d, does not have at all.
+NOTES = {
+    one(0xA7, 500): "WRITE 00A7: sets SOC to 50.0 %",
+    one(0xA7, 0xFFFF): "WRITE 00A7: sets SOC to 6553.5 %",
+    many(0x109, 1, 0xFFFF, address=0x81): "WRITE 0109 to 010A: sets rated capacity to 131071 mAh",
+    one(0x115, 0xFFFF, 0x81): "WRITE 0115: sets sleep to never",
+    one(0xD7, 1): "WRITE 00D7: 1 register, which no list names, to 0001",
+    many(0xCE, 1): "WRITE 00CE: 1 register, which no list names, to 0001",
+    one(0xC9, 0x3132): "WRITE 00C9: 1 register, no setting that we know, to 3132",  # a third of the password
+    one(0x10A, 1, 0x81): "WRITE 010A: 1 register, no setting that we know, to 0001",  # half of the capacity
+    many(0xA9, 0x3132, 0x3334): "WRITE 00A9 to 00AA: 2 registers, no setting that we know, to 3132 3334",
+    one(0x28, 500): "WRITE 0028: 1 register, no setting that we know, to 01F4",
+    one(0x0C, 1): "WRITE 000C: 1 register, no setting that we know, to 0001",
+    one(0x20, 60): "WRITE 0020: 1 register, no setting that we know, to 003C",
+    one(0x3C, 1): "WRITE 003C: 1 register, no setting that we know, to 0001",  # faults
+    one(0x3C, 1, 0x81): "WRITE 003C: 1 register, no setting that we know, to 0001",
+    one(0x97, 0xFFFF): "WRITE 0097: 1 register, no setting that we know, to FFFF",
+}
+
+
+def test_what_a_write_sets_is_noted(dissect: Dissect) -> None:
+    rows = dissect([P(frame, at) for at, frame in enumerate(NOTES)])
+    for row, note in zip(rows, NOTES.values(), strict=True):
+        assert note in expert(row)
