@@ -42,8 +42,9 @@ _EVENT_KEPT: Final = {0x05: 4, 0x0E: 4, 0x0F: 4, 0x13: 255}
 """By event: so many of its parameters, from the first. Disconnection, command complete, status, packets sent."""
 _LE_KEPT: Final = {0x03: 255, 0x07: 255, 0x0C: 255}
 """By LE event: connection update, data length, PHY."""
-_CONNECTED: Final = {0x01: ((6, 12),), 0x0A: ((6, 12), (12, 18), (18, 24))}
-"""Connection complete: where the addresses stand, from the subevent on."""
+_ENHANCED: Final = ((6, 12), (12, 18), (18, 24))
+_CONNECTED: Final = {0x01: ((6, 12),), 0x0A: _ENHANCED, 0x29: _ENHANCED}
+"""Connection complete, enhanced, enhanced version 2: where the addresses stand, from the subevent on."""
 _ADVERTISED: Final = {0x02: (4, 10), 0x0D: (5, 11)}
 """Advertising reports, of one device each: where its address stands."""
 

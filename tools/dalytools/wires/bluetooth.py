@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""Bluetooth: the values of Daly's attributes in HCI captures (link types 187, 201, 254), over scapy's ATT and events.
+"""Bluetooth: the values of Daly's attributes in HCI captures (link types 187, 201, 254), over scapy's ATT.
 
     187   packet                                   packet: kind u8, 02 data, 04 event; H4 of the Bluetooth papers
     201   direction u32, high byte first | packet
@@ -42,13 +42,9 @@ _NOT_TOLD: Final = -1
 """Of an HCI packet whose direction the file does not tell."""
 
 _ATT_CHANNEL: Final = 4
-_CONNECTION_COMPLETE, _LE_META = b"\x03", b"\x3e"
-_CONNECTED: Final = (b"\x01", b"\x0a")  # of LE, the plain one and the enhanced one
-_COMPLETE: Final = (
-    "HCI_Event_Connection_Complete",
-    "HCI_LE_Meta_Connection_Complete",
-    "HCI_LE_Meta_Enhanced_Connection_Complete",
-)
+_CONNECTION_COMPLETE, _LE_META = 0x03, 0x3E
+_CONNECTED: Final = frozenset((0x01, 0x0A, 0x29))
+"""LE events: Connection Complete, Enhanced Connection Complete, and its version 2 (Bluetooth Core, vol 4, part E)."""
 _FIND_INFORMATION_RESPONSE, _READ_BY_TYPE, _READ_BY_TYPE_RESPONSE = 0x05, 0x08, 0x09
 _WRITES: Final = frozenset((0x12, 0x52))
 _NOTICES: Final = frozenset((0x1B, 0x1D))
@@ -135,13 +131,16 @@ class Bluetooth:
 
     def _event(self, interface: int, adapter: int, data: bytes) -> None:
         """Begin a connection anew where an event says so."""
-        if not (data[:1] == _CONNECTION_COMPLETE or (data[:1] == _LE_META and data[2:3] in _CONNECTED)):
+        if len(data) < 3:
             return
-        event = self._layers().HCI_Event_Hdr(data)
-        for name in _COMPLETE:
-            complete = event.getlayer(name)
-            if complete is not None and complete.status == 0 and len(data) > 5:
-                self._connections.pop((interface, adapter, complete.connection_handle & 0xFFF), None)
+        at = 2  # of the status, which the handle follows in all of them; by hand, for scapy knows no version 2
+        if data[0] == _LE_META and data[at] in _CONNECTED:
+            at += 1
+        elif data[0] != _CONNECTION_COMPLETE:
+            return
+        if len(data) >= at + 3 and data[at] == 0:
+            handle = int.from_bytes(data[at + 1 : at + 3], "little") & 0xFFF
+            self._connections.pop((interface, adapter, handle), None)
 
     def _data(self, packet: Packet, adapter: int, received: int, data: bytes) -> Sequence[Packet]:
         """Put an L2CAP packet together; read it when it is whole."""

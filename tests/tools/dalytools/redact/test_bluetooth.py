@@ -102,6 +102,15 @@ def test_the_link_keeps_its_shape(tmp_path: Path) -> None:
     assert out == [packet.replace(DONGLE[::-1], new[::-1]) for _, _, packet in old]
 
 
+@pytest.mark.parametrize(("subevent", "length"), [(0x0A, 31), (0x29, 34)])
+def test_enhanced_events_tell_of_a_connection_too(subevent: int, length: int, tmp_path: Path) -> None:
+    """Address of the peer from byte 6 of the parameters on; the copy's reader has to see the connection begin."""
+    head = b"\x3e" + bytes((length, subevent)) + b"\x00\x40\x00\x00\x01"
+    rest = bytes(length - 12)
+    out = redacted(tmp_path, [(RECEIVED, made.EVENT, head + DONGLE[::-1] + rest)])
+    assert out == [head + bytes.fromhex("010000000002") + rest]
+
+
 def test_what_the_module_says(tmp_path: Path) -> None:
     """Its words stay, what they are about does not."""
     start = [made.connected(DONGLE), *made.discovery()]

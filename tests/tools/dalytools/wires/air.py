@@ -42,10 +42,14 @@ def data(pdu: str, *, handle: int = HANDLE, first: bool = True, whole: int | Non
     return struct.pack("<HH", handle | (0x2000 if first else 0x1000), len(body)) + body
 
 
-def connected(handle: int = HANDLE, *, enhanced: bool = False, status: int = 0) -> bytes:
-    """LE (Enhanced) Connection Complete, without its kind: subevent, status, handle, and the rest as zeros."""
-    rest = bytes(27 if enhanced else 15)
-    inner = struct.pack("<BBH", 0x0A if enhanced else 0x01, status, handle) + rest
+PLAIN, ENHANCED, ENHANCED_2 = 0x01, 0x0A, 0x29
+"""LE Connection Complete, LE Enhanced Connection Complete, and its version 2 (Bluetooth Core 5.4 and later)."""
+_LENGTHS = {PLAIN: 19, ENHANCED: 31, ENHANCED_2: 34}
+
+
+def connected(handle: int = HANDLE, *, subevent: int = PLAIN, status: int = 0) -> bytes:
+    """One of these events, without its kind: subevent, status, handle, and the rest as zeros."""
+    inner = struct.pack("<BBH", subevent, status, handle).ljust(_LENGTHS[subevent], b"\0")
     return bytes((0x3E, len(inner))) + inner
 
 

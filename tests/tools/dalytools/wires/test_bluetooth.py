@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING
 
 import pytest
 from tests.tools.dalytools.made import ANSWER, ASK, a5
-from tests.tools.dalytools.wires.air import RECEIVED, SENT, TOLD, Air, connected, data, long_form
+from tests.tools.dalytools.wires.air import (
+    ENHANCED,
+    ENHANCED_2,
+    HANDLE,
+    PLAIN,
+    RECEIVED,
+    SENT,
+    TOLD,
+    Air,
+    connected,
+    data,
+    long_form,
+)
 
 from dalyref.decoder import decode
 from dalyref.packet import Packet
@@ -96,16 +108,29 @@ def test_where_no_direction_is_told_the_opcode_tells_it() -> None:
     assert air.values() == [(3, "outbound", ASK), (4, "inbound", ANSWER)]
 
 
-@pytest.mark.parametrize("enhanced", [False, True])
-def test_a_new_connection_forgets(enhanced: bool) -> None:
+@pytest.mark.parametrize("subevent", [PLAIN, ENHANCED, ENHANCED_2])
+@pytest.mark.parametrize("link_type", [HCI, HCI_WITH_DIRECTION, LINUX_MONITOR])
+def test_a_new_connection_forgets(link_type: int, subevent: int) -> None:
+    air = Air(link_type)
+    air.discover()
+    air.put(RECEIVED, connected(0x41, subevent=subevent), event=True)
+    air.put(RECEIVED, connected(subevent=subevent, status=0x3E), event=True)  # failed
+    air.put(RECEIVED, connected(subevent=subevent)[:5], event=True)  # cut off in its handle
+    air.speak()
+    air.put(RECEIVED, connected(subevent=subevent), event=True)
+    air.speak()
+    assert [number for number, _, _ in air.values()] == [6, 7]
+
+
+def test_a_new_connection_over_classic_bluetooth_forgets_too() -> None:
     air = Air()
     air.discover()
-    air.put(RECEIVED, connected(0x41, enhanced=enhanced), event=True)
-    air.put(RECEIVED, connected(enhanced=enhanced, status=0x3E), event=True)  # failed
+    failed, begun = (bytes((0x03, 11, status, HANDLE, 0)) + bytes(8) for status in (0x04, 0))
+    air.put(RECEIVED, failed, event=True)
     air.speak()
-    air.put(RECEIVED, connected(enhanced=enhanced), event=True)
+    air.put(RECEIVED, begun, event=True)
     air.speak()
-    assert [number for number, _, _ in air.values()] == [5, 6]
+    assert [number for number, _, _ in air.values()] == [4, 5]
 
 
 def test_adapters_are_apart() -> None:
