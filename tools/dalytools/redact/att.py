@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final
 
+from dalytools.wires.bluetooth import short_uuid
+
 _KEPT: Final = frozenset(
     (0x01, 0x02, 0x03, 0x04, 0x05, 0x07, 0x08, 0x0A, 0x0C, 0x0E, 0x10, 0x11, 0x13, 0x18, 0x19, 0x1E)
 )
@@ -25,10 +27,9 @@ _WRITES: Final = frozenset((0x12, 0x52))
 _NOTICES: Final = frozenset((0x1B, 0x1D))
 _HEADS: Final = {0x06: 7, 0x09: 2, 0x16: 5, 0x17: 5, 0x12: 3, 0x52: 3, 0xD2: 3, 0x1B: 3, 0x1D: 3}
 """Bytes, from the first, that say what a packet is about."""
-_CHARACTERISTIC: Final = b"\x03\x28"
+_CHARACTERISTIC: Final = 0x2803
 _SERVICE: Final = b"\x00\x28"
 _DALYS: Final = frozenset((0xFFF1, 0xFFF2, 0xFF01, 0xFF02))
-_BASE: Final = bytes.fromhex("fb349b5f80000080001000000000")  # of a short UUID in its long form, low byte first
 _MOST_HANDLES: Final = 256
 _SWITCHES: Final = (b"\x00\x00", b"\x01\x00", b"\x02\x00")
 """What is written to have notifications or not."""
@@ -61,7 +62,7 @@ class Attributes:
         rest = size - head
         if opcode in _KEPT:
             if opcode == _READ_BY_TYPE:
-                self._asks_characteristics = pdu[5:] == _CHARACTERISTIC
+                self._asks_characteristics = short_uuid(pdu[5:]) == _CHARACTERISTIC
             elif opcode == _FIND_INFORMATION_RESPONSE and size > 1:
                 self._found(pdu[2:], 2, {1: 2, 2: 16}.get(pdu[1], 0))
             return [(size, Fate.KEPT)]
@@ -94,17 +95,10 @@ class Attributes:
         for at in range(0, len(pairs) - step + 1, step):
             handle = int.from_bytes(pairs[at : at + handle_size], "little")
             uuid = pairs[at + handle_size : at + step]
-            if _short(uuid) not in _DALYS:
+            if short_uuid(uuid) not in _DALYS:
                 self.handles.discard(handle)
             elif len(self.handles) < _MOST_HANDLES:
                 self.handles.add(handle)
-
-
-def _short(uuid: bytes) -> int:
-    """Return the number of a UUID that has a short form; else -1."""
-    if len(uuid) == 2:
-        return int.from_bytes(uuid, "little")
-    return int.from_bytes(uuid[12:14], "little") if uuid[:12] == _BASE[:12] and uuid[14:] == b"\0\0" else -1
 
 
 def _values(step: int, size: int) -> list[tuple[int, Fate]]:

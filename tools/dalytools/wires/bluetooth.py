@@ -50,8 +50,8 @@ _WRITES: Final = frozenset((0x12, 0x52))
 _NOTICES: Final = frozenset((0x1B, 0x1D))
 _CHARACTERISTIC: Final = 0x2803
 _DALYS: Final = frozenset((0xFFF1, 0xFFF2, 0xFF01, 0xFF02))
-_BASE: Final = 0x00000000_0000_1000_8000_00805F9B34FB
-"""A short UUID in its long form is this, and the short one x 2^96."""
+_BASE: Final = bytes.fromhex("0000 1000 8000 00805f9b34fb")[::-1]
+"""A short UUID's long form, low byte first: these twelve bytes, the short one, two of zero."""
 
 _MOST_CONNECTIONS: Final = 256
 _MOST_HANDLES: Final = 256  # of Daly's, in one connection
@@ -88,6 +88,13 @@ def _speaker(received: int, pdu: bytes) -> Direction:
     if opcode in _WRITES and received != 1:
         return "outbound"
     return "inbound" if opcode in _NOTICES and received != 0 else ""
+
+
+def short_uuid(uuid: bytes) -> int | None:
+    """Return the short form of a UUID, given as it is sent; None: it has none."""
+    if len(uuid) == 16 and uuid[:12] == _BASE and uuid[14:] == b"\0\0":
+        uuid = uuid[12:14]
+    return int.from_bytes(uuid, "little") if len(uuid) == 2 else None
 
 
 class Bluetooth:
@@ -208,24 +215,25 @@ class Bluetooth:
             if len(self.others) < _MOST_TOLD:
                 self.others.add(int.from_bytes(pdu[1:3], "little"))
         if opcode == _READ_BY_TYPE and received != 1:
-            connection.asks_characteristics = pdu[5:] == _CHARACTERISTIC.to_bytes(2, "little")
+            connection.asks_characteristics = short_uuid(pdu[5:]) == _CHARACTERISTIC
         elif received == 0:
             pass  # replies of this host, which is asked by somebody
         elif opcode == _READ_BY_TYPE_RESPONSE and connection.asks_characteristics:
             response = self._layers().ATT_Hdr(pdu)
             for one in getattr(response.payload, "handles", ()):
                 value: bytes = one.value  # properties, handle of the value, UUID
-                self._found(connection, int.from_bytes(value[1:3], "little"), int.from_bytes(value[3:], "little"))
+                self._found(connection, int.from_bytes(value[1:3], "little"), value[3:])
         elif opcode == _FIND_INFORMATION_RESPONSE:
             response = self._layers().ATT_Hdr(pdu)
+            size = 2 if pdu[1:2] == b"\x01" else 16
             for one in getattr(response.payload, "handles", ()):
-                self._found(connection, one.handle, int(one.value))
+                self._found(connection, one.handle, int(one.value).to_bytes(size, "little"))
         return ()
 
     @staticmethod
-    def _found(connection: _Connection, handle: int, uuid: int) -> None:
+    def _found(connection: _Connection, handle: int, uuid: bytes) -> None:
         """Note whose attribute a handle is; a later discovery is right."""
-        if uuid in _DALYS or ((uuid - _BASE) >> 96 in _DALYS and uuid & (1 << 96) - 1 == _BASE):
+        if short_uuid(uuid) in _DALYS:
             if len(connection.handles) < _MOST_HANDLES:
                 connection.handles.add(handle)
         else:

@@ -111,6 +111,13 @@ def test_enhanced_events_tell_of_a_connection_too(subevent: int, length: int, tm
     assert out == [head + bytes.fromhex("010000000002") + rest]
 
 
+def test_characteristics_asked_for_in_the_long_form_stay(tmp_path: Path) -> None:
+    """Else nothing in the copy tells which attributes are Daly's."""
+    long = struct.pack("<BHH", 8, 1, 0xFFFF) + bytes.fromhex("fb349b5f8000008000100000" + "03280000")
+    old = [*made.l2cap(SENT, long), *made.discovery()[1:]]
+    assert redacted(tmp_path, old) == [packet for _, _, packet in old]
+
+
 def test_what_the_module_says(tmp_path: Path) -> None:
     """Its words stay, what they are about does not."""
     start = [made.connected(DONGLE), *made.discovery()]

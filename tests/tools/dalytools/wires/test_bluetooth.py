@@ -60,6 +60,8 @@ def test_attributes_are_known_by_discovery(link_type: int, told: str) -> None:
     [
         "0907" + "0e00040f00192a" + "1000101100002a",  # other characteristics
         "0915" + "0e00040f00" + "f2ff" + "11" * 14 + "1000101100" + "f1ff" + "22" * 14,  # UUIDs of somebody's own
+        "0915" + "0e00040f00" + "f2ff" + "00" * 14 + "1000101100" + "f1ff" + "00" * 14,  # and these have no short form
+        "0502" + "0f00" + "f2ff" + "00" * 14 + "1100" + "f1ff" + "00" * 14,
     ],
 )
 def test_other_devices_are_left_alone(told: str) -> None:
@@ -76,6 +78,15 @@ def test_only_answers_about_characteristics_tell() -> None:
     air.put(RECEIVED, data(TOLD))
     air.speak()
     assert air.values() == []
+
+
+@pytest.mark.parametrize(("asked", "known"), [("2803", True), ("2a00", False)])
+def test_what_is_asked_for_may_stand_in_its_long_form(asked: str, known: bool) -> None:
+    air = Air()
+    air.put(SENT, data("080100ffff" + long_form(asked)))
+    air.put(RECEIVED, data(TOLD))
+    air.speak()
+    assert air.values() == ([(3, "outbound", ASK), (4, "inbound", ANSWER)] if known else [])
 
 
 def test_attributes_are_known_by_their_handles() -> None:
