@@ -219,16 +219,19 @@ class Bluetooth:
         elif received == 0:
             pass  # replies of this host, which is asked by somebody
         elif opcode == _READ_BY_TYPE_RESPONSE and connection.asks_characteristics:
-            response = self._layers().ATT_Hdr(pdu)
-            for one in getattr(response.payload, "handles", ()):
+            for one in self._entries(pdu, "value"):
                 value: bytes = one.value  # properties, handle of the value, UUID
                 self._found(connection, int.from_bytes(value[1:3], "little"), value[3:])
         elif opcode == _FIND_INFORMATION_RESPONSE:
-            response = self._layers().ATT_Hdr(pdu)
             size = 2 if pdu[1:2] == b"\x01" else 16
-            for one in getattr(response.payload, "handles", ()):
+            for one in self._entries(pdu, "handle"):
                 self._found(connection, one.handle, int(one.value).to_bytes(size, "little"))
         return ()
+
+    def _entries(self, pdu: bytes, wanted: str) -> list[Any]:
+        """Return the entries of a discovery's answer; scapy gives an incomplete one as bytes without that field."""
+        entries = getattr(self._layers().ATT_Hdr(pdu).payload, "handles", ())
+        return [one for one in entries if hasattr(one, wanted)]
 
     @staticmethod
     def _found(connection: _Connection, handle: int, uuid: bytes) -> None:

@@ -211,6 +211,22 @@ def test_cut_off_and_damaged_packets_are_no_error() -> None:
                 carriers.of(Packet(number=9, time_ns=0, data=each.data[:cut], link_type=each.link_type))
 
 
+@pytest.mark.parametrize("told", ["050111", "05010f00f2", "05020f00f2", "0904", "0907" + "0e", "0902" + "0e000f"])
+def test_discoveries_that_end_in_a_part_of_an_entry_are_no_error(told: str) -> None:
+    air = Air()
+    air.discover(told)
+    air.discover()
+    air.speak()
+    assert air.values() == [(5, "outbound", ASK), (6, "inbound", ANSWER)]
+
+
+def test_a_part_of_an_entry_hides_no_whole_one() -> None:
+    air = Air()
+    air.discover("0501" + "0f00f2ff" + "1100f1ff" + "1200f1")
+    air.speak()
+    assert air.values() == [(3, "outbound", ASK), (4, "inbound", ANSWER)]
+
+
 def test_without_scapy_it_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "scapy.layers.bluetooth", None)
     monkeypatch.setitem(sys.modules, "scapy.layers", None)
