@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """From packets of a network to TCP segments, over scapy's layers: Ethernet (VLAN too), Linux cooked, raw IP, 4 and 6.
 
+    BSD loopback (LINKTYPE_NULL)    family u32, in the byte order of the machine that captured | IP
+
 What can't hold one of the ports is passed over before scapy looks at it, for scapy takes its time.
 """
 
@@ -119,7 +121,8 @@ def _layers() -> _Layers:
         from scapy.config import conf
         from scapy.layers.inet import IP, TCP
         from scapy.layers.inet6 import IPv6
-        from scapy.layers.l2 import CookedLinux, CookedLinuxV2, Ether, Loopback
+        from scapy.layers.l2 import CookedLinux, CookedLinuxV2, Ether
+        from scapy.packet import Raw
     except ImportError:
         raise missing("TCP is read with", "scapy", "scapy") from None
     conf.debug_dissector = 0  # what is damaged is no reason to stop
@@ -130,7 +133,14 @@ def _layers() -> _Layers:
     def raw(data: bytes) -> Any:
         return (IPv6 if data[0] >> 4 == 6 else IP)(data, stop_dissection_after=TCP)
 
-    others = {0: by(Loopback), 1: by(Ether), 113: by(CookedLinux), 276: by(CookedLinuxV2)}
+    families = {2: IP, 24: IPv6, 28: IPv6, 30: IPv6}  # NetBSD and OpenBSD have 24, FreeBSD 28, macOS 30
+    heads = {number.to_bytes(4, order): ip for number, ip in families.items() for order in ("little", "big")}
+
+    def loopback(data: bytes) -> Any:
+        """By hand: scapy takes the families of the machine that it runs on, in one byte order."""
+        return heads.get(data[:4], Raw)(data[4:], stop_dissection_after=TCP)
+
+    others = {0: loopback, 1: by(Ether), 113: by(CookedLinux), 276: by(CookedLinuxV2)}
     return _Layers(TCP, IP, IPv6, {**others, **dict.fromkeys((12, 14, 101, 228, 229), raw)})
 
 

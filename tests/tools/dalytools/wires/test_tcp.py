@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import pytest
 from scapy.layers.inet import ICMP, IP, TCP
@@ -233,6 +233,21 @@ def test_the_layers_below(way: str) -> None:
     assert handed([packet(1, data, link_type=link_type)]) == [(1, ASK, False)]
     for cut in range(0, len(data), 3):  # cut off anywhere: less, never an error
         handed([packet(1, data[:cut], link_type=link_type)])
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize(
+    ("family", "carries"),
+    [(2, V4), (24, V6), (28, V6), (30, V6), (10, V6), (7, V4)],
+    ids=["IPv4", "NetBSD", "FreeBSD", "macOS", "Linux's is none", "OSI"],
+)
+def test_families_of_a_loopback_interface(family: int, carries: Layers, order: Literal["little", "big"]) -> None:
+    """LINKTYPE_NULL: 2 IPv4, 24, 28 and 30 IPv6, in the byte order of the machine that captured."""
+    right = family in {2, 24, 28, 30}
+    data = family.to_bytes(4, order) + bytes(carries / SEGMENT)
+    assert handed([packet(1, data, link_type=0)]) == ([(1, ASK, False)] if right else [])
+    for cut in range(len(data)):
+        handed([packet(1, data[:cut], link_type=0)])
 
 
 def test_other_traffic_is_left_alone() -> None:
