@@ -33,11 +33,17 @@ from scapy.fields import (
 from scapy.layers.can import CAN
 from scapy.packet import Packet, Raw
 
-from dalyref import a5, addresses, modbus
+from dalyref import a5, addresses, can_classic, modbus
 
 __all__ = ["DalyCan", "DalyFrame", "DalyModbus"]
 
 USER0, SOCKETCAN = 147, 227
+_EXTENDED = 4
+"""Of the flags of a SocketCAN frame: 29 bits, no remote frame, no error."""
+_MOST_CAN_BYTES = 8
+_D2 = 0xD2
+_REGISTERS = modbus.LARGEST_READ // 2
+_LONGEST_BODY = modbus.LONGEST - 4  # address, function, CRC
 _REPLY_OFFSET = 0x30
 """80 + N asks, 50 + N answers."""
 
@@ -100,7 +106,7 @@ class DalyModbus(Packet):
     fields_desc: ClassVar[list[Any]] = [
         XByteField("address", 0xD2),
         XByteField("function", modbus.READ),
-        StrLenField("body", b"", length_from=lambda packet: packet.body_length),
+        StrLenField("body", b"", length_from=lambda packet: packet.body_length, max_length=_LONGEST_BODY),
         LEShortField("crc", None),
     ]
     body_length = 0
@@ -118,7 +124,9 @@ class DalyModbus(Packet):
 
     @classmethod
     def reply(cls, address: int, *values: int) -> DalyModbus:
-        """Build the reply to a read."""
+        """Build the reply to a read. Raise ValueError where the values are more than a frame has room for."""
+        if len(values) > _REGISTERS:
+            raise ValueError(f"a reply has room for {_REGISTERS} registers, not {len(values)}")
         body = bytes((2 * len(values),)) + b"".join(value.to_bytes(2, "big") for value in values)
         return cls(address=address, function=modbus.READ, body=body)
 
@@ -140,12 +148,30 @@ class DalyModbus(Packet):
 
     def hashret(self) -> bytes:
         """Return what a request and its reply have in common."""
-        asked = self.address - _REPLY_OFFSET if modbus.asks(self.address) and self.address != 0xD2 else self.address
+        asked = self.address - _REPLY_OFFSET if modbus.asks(self.address) and self.address != _D2 else self.address
         return bytes((asked, self.function & 0x7F))
 
     def answers(self, other: Any) -> int:
         """Tell a reply to `other`."""
-        return int(isinstance(other, DalyModbus) and modbus.answers(self.address) and self.hashret() == other.hashret())
+        return int(
+            isinstance(other, DalyModbus)
+            and self._may(reply=True)
+            and other._may(reply=False)
+            and self.hashret() == other.hashret()
+        )
+
+    def _may(self, *, reply: bool) -> bool:
+        """Tell whether it may be a reply, or a request: by address, and of D2, which has one for both, by its shape.
+
+        A write of one register and its reply are the same frame.
+        """
+        if not (modbus.answers if reply else modbus.asks)(self.address):
+            return False
+        if self.address != _D2 or self.function == modbus.WRITE_ONE:
+            return True
+        start_and_count = len(self.body) == 4
+        is_reply = start_and_count if self.function == modbus.WRITE_MANY else not start_and_count
+        return is_reply is reply
 
 
 class DalyCan(Packet):
@@ -157,14 +183,14 @@ class DalyCan(Packet):
 
     name = "Daly CAN"
     fields_desc: ClassVar[list[Any]] = [
-        BitField("flags", 4, 3),  # extended
+        BitField("flags", _EXTENDED, 3),
         BitField("priority", 0x18, 5),
         XByteField("data_id", 0x90),
         XByteField("destination", 0x01),
         XByteField("source", 0x40),
         FieldLenField("length", None, length_of="data", fmt="B"),
         X3BytesField("padding", 0),
-        StrLenField("data", bytes(8), length_from=lambda packet: packet.length),
+        StrLenField("data", bytes(8), length_from=lambda packet: packet.length, max_length=_MOST_CAN_BYTES),
     ]
 
     def hashret(self) -> bytes:
@@ -186,12 +212,14 @@ class _SocketCan(CAN):
 
     @classmethod
     def dispatch_hook(cls, _pkt: bytes = b"", *_args: Any, **_kargs: Any) -> Any:
-        """Choose by the identifier (docs/wires.md 2, first row)."""
-        if len(_pkt) >= 8 and _pkt[0] == 0x98 and 0x90 <= _pkt[1] <= 0x98:
-            sides = sorted(addresses.is_request(address) for address in _pkt[2:4])
-            if sides == [False, True]:
-                return DalyCan
-        return CAN
+        """Choose by flags and identifier (docs/wires.md 2, first row), among frames of at most 8 bytes."""
+        others = CAN.dispatch_hook(_pkt)  # CAN FD has a class of its own
+        if others is not CAN or len(_pkt) < 8:
+            return others
+        word = int.from_bytes(_pkt[:4])
+        identifier = word & 0x1FFFFFFF
+        known = can_classic.fits(identifier) and can_classic.data_id(identifier) in can_classic.PAPER
+        return DalyCan if known and word >> 29 == _EXTENDED else CAN
 
 
 def _first(data: bytes) -> Any:
