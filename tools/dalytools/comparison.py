@@ -26,6 +26,7 @@ from dalycapture.errors import CaptureError
 from dalycapture.linktype import DALY_LINK_TYPES, TAKEN_LINK_TYPE, link_type_name
 from dalycapture.reader import read_capture
 from dalyref.decoder import Decoded, Decoder, Options
+from dalyref.records import Splitter
 from dalytools.field_names import FIELD_NAMES
 from dalytools.problem import Problem
 from dalytools.tshark import Tshark, lua_complaint
@@ -36,7 +37,7 @@ from dalytools.wires.choice import Choice
 from dalytools.wires.left_out import LeftOut
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
     from pathlib import Path
 
     from dalyref.packet import Packet
@@ -145,8 +146,9 @@ def compare(
     result = Comparison()
     wires = wires or Choice()
     carriers = Carriers(wires)
-    serial = DALY_LINK_TYPES.intersection(_link_types(path, carriers, result, listener))
-    left_out = _incomparable(tshark, carriers)
+    pieces = _Pieces()
+    serial = DALY_LINK_TYPES.intersection(_link_types(path, carriers, result, listener, pieces))
+    left_out = _incomparable(tshark, carriers) | pieces.cut_off
     result.left_out = carriers.left_out
     if left_out:
         result.left_out.append(LeftOut("tcp_connections", len(left_out)))
@@ -278,7 +280,40 @@ def _drain(stream: IO[bytes], into: list[bytes]) -> None:
             kept += len(chunk)
 
 
-def _link_types(path: Path, carriers: Carriers, result: Comparison, listener: Listener | None) -> set[int]:
+class _Pieces:
+    """Finds the TCP connections with a frame in pieces one of which the snap length cut off (docs/wires.md, 4).
+
+    Wireshark hands such a segment over by itself, and loses its place in the frame that began before it.
+    """
+
+    def __init__(self) -> None:
+        self.cut_off: set[str] = set()
+        """Connections, by name."""
+        self._sides: dict[tuple[str, str], Splitter] = {}
+        self._cut: set[int] = set()
+
+    def take(self, given: Sequence[Packet], *, cut: int = 0) -> None:
+        """Take what has come of a packet, and of those that waited for it. cut: its number, where it is cut off."""
+        if cut:
+            self._cut.add(cut)
+        for one in given:
+            if one.transport != "tcp":
+                continue
+            side = self._sides.setdefault((one.connection, one.direction), Splitter())
+            if one.after_gap:
+                side.flush()
+            if one.number in self._cut and side.pending:
+                self.cut_off.add(one.connection)
+            side.feed(one.data, decide=True)
+            if not side.begun:
+                side.flush()
+        if given:  # with it came all that had waited
+            self._cut.clear()
+
+
+def _link_types(
+    path: Path, carriers: Carriers, result: Comparison, listener: Listener | None, pieces: _Pieces | None = None
+) -> set[int]:
     """Return the link types of ours in the file, looking at all of it, and whether it reads to its end."""
     ours: set[int] = set()
     others: set[int] = set()
@@ -288,7 +323,9 @@ def _link_types(path: Path, carriers: Carriers, result: Comparison, listener: Li
             packets += 1
             if _is_ours(carriers, packet):
                 ours.add(packet.link_type)
-                carriers.of(packet)
+                given = carriers.of(packet)
+                if pieces is not None:
+                    pieces.take(given, cut=packet.number if carriers.cut else 0)
             else:
                 others.add(packet.link_type)
             if listener is not None:
@@ -297,7 +334,9 @@ def _link_types(path: Path, carriers: Carriers, result: Comparison, listener: Li
         if not packets:
             raise Problem(str(error)) from None
         result.broken = str(error)
-    carriers.finish()
+    rest = carriers.finish()
+    if pieces is not None:
+        pieces.take(rest)
     if not packets:
         raise Problem(f"{path}: the capture holds no packet")
     if not ours:
@@ -330,6 +369,8 @@ class _Fed:
         """Packets that tshark has to show."""
         self.passed_over: set[int] = set()
         """Packets of connections that are not compared."""
+        self.cut: set[int] = set()
+        """TCP packets that the snap length cut bytes off."""
         self._packets = _packets(path)
         self._carriers = Carriers(wires)
         self._left_out = left_out
@@ -357,6 +398,8 @@ class _Fed:
             carriers = self._carriers.of(packet)
             if self._carriers.connection in self._left_out:
                 self.passed_over.add(packet.number)
+            if self._carriers.cut:
+                self.cut.add(packet.number)
             self._feed(carriers)
 
     def _feed(self, carriers: Iterable[Packet]) -> None:
@@ -394,7 +437,10 @@ def _walk(rows: IO[bytes], fed: _Fed, result: Comparison, progress: Callable[[in
             continue
         key = fed.streams.pop(number, None)
         rest = (_Rest(), _Rest()) if key is None else sides.setdefault(key, (_Rest(), _Rest()))
-        _packet(number, values[1:], mine, rest, result)
+        # The dissector shows the beginning of a frame that is cut off in the packet itself, as no more of it can come.
+        open_end = number in fed.cut
+        fed.cut.discard(number)
+        _packet(number, values[1:], mine, rest, result, open_end=open_end)
         if key is None:  # a packet that is not ours has no record in either reading
             _close(number, rest, result)
         last_seen = number
@@ -422,12 +468,22 @@ def _close(number: int, rest: tuple[_Rest, _Rest], result: Comparison) -> None:
         result.add(Difference(number, "bytes before", shown, told))
 
 
-def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Rest, _Rest], result: Comparison) -> None:
-    """Compare all records that end in one packet."""
+def _packet(
+    number: int,
+    values: list[str],
+    mine: list[Decoded],
+    rest: tuple[_Rest, _Rest],
+    result: Comparison,
+    *,
+    open_end: bool = False,
+) -> None:
+    """Compare all records that end in one packet; open_end: but for cut-off frames and junk behind the others."""
     *values, lua_error, expert = values
     if lua_error:
         result.add(Difference(number, _LUA_ERROR, expert, "none"))
     seen = [value.split(_BETWEEN_VALUES) if value else [] for value in values]
+    opened = tuple(len(side.open) for side in rest)
+    pieces = tuple(len(side.pieces) for side in rest)
     _set_aside(number, seen, rest[0])
     told: dict[str, list[object]] = {}
     for record in mine:
@@ -439,6 +495,9 @@ def _packet(number: int, values: list[str], mine: list[Decoded], rest: tuple[_Re
             rest[1].close(number)
         for name, value in record.fields.items():
             told.setdefault(name, []).extend(value if isinstance(value, list) else [value])
+    if open_end:
+        for side, length, count in zip(rest, opened, pieces, strict=True):
+            side.open = side.open[:length] if len(side.pieces) == count else ""
     _compare_rest(*rest, result)
     if any(len(side.open) > _MOST_REST for side in rest):
         _compare_open(number, rest, result)

@@ -61,6 +61,11 @@ class Carriers:
         return self._tcp.latest if self._tcp is not None else ""
 
     @property
+    def cut(self) -> bool:
+        """Tell whether the latest packet is a TCP segment that the snap length cut bytes off."""
+        return self._tcp is not None and self._tcp.cut
+
+    @property
     def nothing(self) -> str:
         """Say what a user may have chosen wrongly, where no packet so far was of a bus; empty: some were, or may be."""
         if self._others or self._bluetooth.found or (self._tcp is not None and self._tcp.found):
@@ -97,7 +102,7 @@ class Carriers:
         self._others = self._others or packet.link_type in SERIAL_LINK_TYPES or packet.link_type == SOCKETCAN
         self._network = self._network or packet.link_type in NETWORK
         if tcp is not None:
-            tcp.latest = ""
+            tcp.latest, tcp.cut = "", False
         if tcp is None or not (tcp.waits or packet.link_type in NETWORK):
             return self._at_once(packet)
         given = tcp.feed(packet) if packet.link_type in NETWORK else tcp.pass_time(packet.time_ns)

@@ -17,11 +17,14 @@ What = Literal["tcp_connections", "tcp_records", "ble_values", "ble_packets"]
 _WORDS: dict[What, tuple[str, str]] = {
     "tcp_connections": (
         "TCP connection",
-        "not compared: where a capture has lost segments, Wireshark can't show well those that came late or twice",
+        (
+            "not compared: where a capture has lost segments, Wireshark can't show well those that came late or twice, "
+            "nor a frame in pieces one of which the snap length cut off"
+        ),
     ),
     "tcp_records": (
         "incomplete TCP record",
-        "not compared: its end is lost or not in the capture, and Wireshark shows a TCP segment",
+        "not compared: its end is lost, cut off or not in the capture, and Wireshark may show a TCP segment",
     ),
     "ble_packets": ("Bluetooth packet", "left out: a piece of it is missing, or was cut off by the snap length"),
     "ble_values": (

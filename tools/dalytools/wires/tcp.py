@@ -106,6 +106,8 @@ class Tcp:
         """Connections, by name, with segments that brought what had come before."""
         self.latest = ""
         """The connection of the latest segment."""
+        self.cut = False
+        """The snap length cut bytes off the latest segment."""
         self.lost = False
         """Bytes of some connection are missing."""
 
@@ -125,7 +127,7 @@ class Tcp:
         segment = self._network.segment(packet.link_type, packet.data, packet.time_ns)
         if segment is not None:
             connection, which = self._connection(segment, out)
-            self.latest = connection.name
+            self.latest, self.cut = connection.name, segment.missing > 0
             self._acknowledge(connection, 1 - which, segment, packet)
             self._take(connection, which, segment, packet, out)
         return out

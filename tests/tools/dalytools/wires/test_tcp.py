@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -314,6 +315,36 @@ def test_both_readings_agree(way: str, tmp_path: Path) -> None:
     frames = {"lost": 5, "incomplete at the end": 3}.get(way, 4 if shift else 7)
     assert found.kinds.get("frame") == frames
     assert found.kinds.get("bad_checksum", 0) == (1 if shift else 0)
+
+
+SNAPPED = {
+    # segments of the stream, with how many bytes are cut off; connections left out; frames
+    "one frame": ([(0, 13, 4), (13, 26, 0)], 0, 1),
+    "behind a whole one": ([(0, 26, 4), (26, 39, 0)], 0, 2),
+    "all of its data": ([(0, 13, 13), (13, 26, 0)], 0, 1),
+    "the last one": ([(0, 13, 0), (13, 26, 4)], 0, 1),
+    "twice": ([(0, 13, 4), (13, 26, 4), (26, 78, 0)], 0, 4),
+    "the second piece of a frame": ([(0, 5, 0), (5, 13, 4), (13, 26, 0)], 1, 0),
+}
+
+
+@pytest.mark.parametrize("way", SNAPPED)
+def test_packets_that_the_snap_length_cut_off(way: str, tmp_path: Path) -> None:
+    """Wireshark waits for nothing behind such a packet, so the dissector shows what is left of a frame."""
+    cuts, left_out, frames = SNAPPED[way]
+    path = tmp_path / "tcp.pcap"
+    content = struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, 65535, RAW_IP)  # times in nanoseconds
+    for number, (start, stop, cut) in enumerate(cuts):
+        data = ip(SERVER, 1000 + start, STREAM[start:stop])
+        kept = len(data) - cut
+        content += struct.pack("<IIII", 1_700_000_000, number * 10_000_000, kept, len(data)) + data[:kept]
+    path.write_bytes(content)
+    path.chmod(0o644)
+    with Tshark() as tshark:
+        found = compare(tshark, path, wires=CHOICE)
+    assert found.differences == []
+    assert sum(one.count for one in found.left_out if one.what == "tcp_connections") == left_out
+    assert found.kinds.get("frame", 0) == frames
 
 
 def of_another_client(segment: bytes) -> bytes:
