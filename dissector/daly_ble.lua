@@ -17,8 +17,6 @@ local view = require("daly_view")
 
 local M = {}
 
--- Handles of attributes at whose values we come in: those that boards have, and most others.
-local FIRST_HANDLE, LAST_HANDLE = 1, 255
 local MOST_HANDLE = 65535
 
 -- State of the capture that is open.
@@ -67,11 +65,15 @@ local function handles_of(range)
   return set
 end
 
--- Come in at the values of these attributes, where nobody else is.
-local function come_in(from, to)
-  for handle = from, to do
-    if not attributes:get_dissector(handle) then
-      attributes:add(handle, hook)
+-- Come in at the values of all attributes, where nobody else is: what handles a board's have, its maker decides.
+local function come_in()
+  local others, free = attributes.get_dissector, 1
+  for handle = 1, MOST_HANDLE + 1 do
+    if handle > MOST_HANDLE or others(attributes, handle) then
+      if free < handle then
+        attributes:add(free .. "-" .. handle - 1, hook)
+      end
+      free = handle + 1
     end
   end
 end
@@ -82,9 +84,6 @@ function M.init(with, handles)
   first, read_to, began = new_state(), 0, nil
   blind = second_look.new(new_state())
   blind.early = 0 -- number of the newest of those that were not read at first
-  for handle in pairs(chosen) do
-    come_in(handle, handle)
-  end
 end
 
 -- Reading -----------------------------------------------------------------------------------------
@@ -213,7 +212,9 @@ end
 
 --- Once: where we come in. `daly`: the protocol.
 function M.setup(daly)
-  hook = Proto("daly_ble", "Daly BMS over Bluetooth")
+  -- With each handle Wireshark looks for the protocol in a list sorted by name, behind all of Bluetooth's own, which
+  -- begin with bt: there it would start up half again as slowly.
+  hook = Proto("ble_daly", "Daly BMS over Bluetooth")
   function hook.dissector(buffer, pinfo, parent)
     if buffer:offset() > 0 then -- the value of an attribute
       watch()
@@ -224,7 +225,7 @@ function M.setup(daly)
     end
     return 0
   end
-  come_in(FIRST_HANDLE, LAST_HANDLE)
+  come_in()
   wiresharks = encapsulations:get_dissector(H4)
   if wiresharks then
     encapsulations:add(H4, hook)

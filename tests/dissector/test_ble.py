@@ -123,6 +123,23 @@ def test_attributes_by_discovery(dissect: Dissect, way: str, passes: str) -> Non
     assert seen[quiet:] == ([""] * 12 if missed else ["frame"] * 8 + [""] * 4)
 
 
+HIGHEST = [(0x00FF, 0x0100), (0x0211, 0x020F), (0xFFFF, 0xFFFD)]  # handles of fff1 and fff2
+
+
+@pytest.mark.parametrize("passes", PASSES)
+@pytest.mark.parametrize("link_type", [H4, H4_DIRECTION, MONITOR])
+@pytest.mark.parametrize(("speaks", "writes"), HIGHEST)
+def test_any_handle(dissect: Dissect, speaks: int, writes: int, link_type: int, passes: str) -> None:
+    made = Radio(link_type=link_type)
+    made.complete()
+    made.discover((writes, 0xFFF2), (speaks, 0xFFF1))
+    made.write(writes, REQUEST)
+    made.notify(speaks, REPLY)
+    rows = run(dissect, made, **PASSES[passes])
+    assert kinds(rows) == ["", "", "", "frame", "frame"]
+    assert (number(rows[4], "pack.voltage"), number(rows[4], "request_in")) == (53.3, 4)
+
+
 def test_indications_count_as_notifications(dissect: Dissect) -> None:
     made = radio()
     made.notify(SPEAKS, REPLY, opcode=INDICATE)
