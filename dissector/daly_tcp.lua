@@ -76,21 +76,23 @@ local forgets = tonumber(major) * 100 + tonumber(minor) >= 405
 
 -- What was undecided in this direction and stands in front of `raw` or at its beginning, if anything; and the sequence
 -- number behind `raw`. Wireshark hands such bytes to us again, as if they came with the next segment, but not those
--- that we kept, nor where bytes between were lost.
+-- that we kept, nor where bytes between were lost. A segment that tells them again, and more, is no longer than what
+-- we are handed then: so where it begins decides.
 local function before_of(bus, side, raw)
   local before = held[bus] and held[bus][side]
   local length, at = segment_length(), sequence()
   local begin = length and at and at.value + math.max(0, length.value - #raw)
   if before then
     local known = before.bytes:sub(before.kept + 1)
+    local first = before.next and (before.next - #known) % SEQUENCES
     if known == "" then
       if not begin or begin ~= before.next then
         before = nil
       end
-    elseif length and length.value == #raw or raw:sub(1, #known) ~= known then
+    elseif raw:sub(1, #known) ~= known or length and length.value == #raw and begin ~= first then
       before = nil
     else
-      begin = before.next and before.next - #known
+      begin = first
     end
   end
   return before, begin and (begin + #raw) % SEQUENCES

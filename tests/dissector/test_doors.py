@@ -315,6 +315,46 @@ def test_a_reply_in_pieces_began_with_its_first(on_tcp: Tshark, open_folder: Pat
     assert rows == [[""], [""], [""], ["0.01"]]
 
 
+@pytest.mark.parametrize("passes", [(), ("-2",), ("-2", "-Y", "frame")])
+@pytest.mark.parametrize(("pieces", "more"), [((6,), ""), ((6, 9), ""), ((6,), a5(1, 0x91)), ((12,), ""), ((1, 3), "")])
+def test_a_reply_sent_again_as_a_whole_began_with_its_first_piece(
+    on_tcp: Tshark, open_folder: Path, pieces: tuple[int, ...], more: str, passes: tuple[str, ...]
+) -> None:
+    """A sender that waited in vain puts what it sent in pieces, and what came since, into one segment."""
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)  # at 0
+    first = connection.next[1]
+    for start, end in itertools.pairwise((0, *pieces)):  # the first at 10 ms
+        connection.send(1, REPLY[2 * start : 2 * end])
+    connection.send(1, REPLY + more, at=first)
+    connection.next[1] = first + len(REPLY + more) // 2
+    connection.send(0, REQUEST)
+    connection.send(1, REPLY)
+    names = ["daly.data_id", "daly.request_in", "daly.response_time"]
+    words = (*passes, *PORTS, "-o", "tcp.reassemble_out_of_order:TRUE")  # else Wireshark leaves the second one out
+    rows = ask(on_tcp, connection.save(), *words, names=names)
+    waiting = [["", "", ""]] * len(pieces)
+    again = len(pieces) + 3
+    assert rows == [
+        ["0x90", "", ""],
+        *waiting,
+        ["0x90,0x91" if more else "0x90", "1", "0.01"],
+        ["0x90", "", ""],
+        ["0x90", str(again), "0.01"],
+    ]
+
+
+def test_what_looks_like_what_is_held_but_stands_elsewhere_is_not_it(on_tcp: Tshark, open_folder: Path) -> None:
+    """Half a reply, bytes that are lost, and a whole one: that began with its own packet."""
+    connection = Connection(open_folder)
+    connection.send(0, REQUEST)
+    connection.send(1, REPLY[:12])
+    connection.next[1] += 7
+    connection.send(1, REPLY)
+    rows = ask(on_tcp, connection.save(), "-2", "-Y", "frame", *PORTS, names=["daly.response_time"])
+    assert rows[2] == ["0.02"]
+
+
 def test_a_damaged_frame_whose_end_may_begin_another_is_one_piece(tshark: Tshark, open_folder: Path) -> None:
     connection = Connection(open_folder)
     connection.send(1, REPLY[:24] + "d2")  # D2 may be the first byte of a Modbus frame
