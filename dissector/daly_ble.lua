@@ -101,18 +101,25 @@ local function is_text(value)
     )
 end
 
+local function stream_of(capture, connection, way)
+  return streams.stream(capture, connection.number * 2 + way, connection.number, way)
+end
+
 -- One packet, in the order of the capture, once. `unseen`: the one before it was not read.
 local function read(state, adapter, number, pinfo, raw, length, unseen)
-  local connection, value, at, lost, way = hci.read(state.host, raw, length, adapter, pinfo.p2p_dir, unseen)
+  local connection, value, way, at, lost, cut = hci.read(state.host, raw, length, adapter, pinfo.p2p_dir, unseen)
   if not connection then
     return
   end
   local capture = state.capture
-  local stream = streams.stream(capture, connection.number * 2 + way, connection.number, way)
   if lost then
-    streams.divide(capture, stream)
+    streams.divide(capture, stream_of(capture, connection, lost))
+  end
+  if cut then
+    streams.divide(capture, stream_of(capture, connection, cut))
   end
   if value and value ~= "" then
+    local stream = stream_of(capture, connection, way)
     state.values[number], state.places[number] = value, at
     if is_text(value) and not streams.is_open(stream) then
       streams.aside(capture, stream, number, pinfo.rel_ts, value, "Bluetooth module")

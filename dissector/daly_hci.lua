@@ -120,18 +120,18 @@ local function goes(direction, way)
   return direction == way or (direction ~= SENT and direction ~= RECEIVED)
 end
 
--- Whether an ATT packet, or the beginning of one, carries a value of an attribute of ours, and its way.
-local function is_ours(host, connection, pdu, direction)
+-- The way that an ATT packet, or the beginning of one, goes where it carries a value of an attribute of ours; else nil.
+local function way_of(host, connection, pdu, direction)
   local opcode = byte(pdu, 1)
   local handle = u16(pdu, 2)
   local way = CARRIES[opcode]
-  if not way or not handle or not goes(direction, way) then
-    return false
+  if way and handle and goes(direction, way) and (connection.attributes[handle] or host.chosen[handle]) then
+    return way
   end
-  return connection.attributes[handle] or host.chosen[handle] or false, way
+  return nil
 end
 
--- An ATT packet: learn from it; whether it carries a value of ours, and its way.
+-- An ATT packet: learn from it; the way that it goes, where it carries a value of ours, else nil.
 local function attribute(host, connection, pdu, direction, unseen)
   local opcode, format = byte(pdu, 1, 2)
   if opcode == READ_TYPE and goes(direction, SENT) then
@@ -146,23 +146,24 @@ local function attribute(host, connection, pdu, direction, unseen)
   elseif opcode == FIND_INFO_REPLY and goes(direction, RECEIVED) then
     learn(host, connection, pdu, 3, format == 1 and 4 or format == 2 and 18 or 0, 0, 2)
   else
-    return is_ours(host, connection, pdu, direction)
+    return way_of(host, connection, pdu, direction)
   end
-  return false
+  return nil
 end
 
--- What the L2CAP packet that ends with this piece carries, where that is ATT, else nil; and whether bytes of ours are
--- lost: the rest of the one before, or of this one.
+-- What the L2CAP packet that ends with this piece carries, where that is ATT, else nil; and the ways of bytes of ours
+-- that are lost, nil where none are: of the rest of the one before, and of this one. Where the capture does not tell
+-- directions, those may go either way each.
 local function put_together(host, connection, piece, continues, direction, cut)
-  local pending, lost = connection.pending[direction], false
+  local pending, lost = connection.pending[direction], nil
   connection.pending[direction] = nil
   if continues then
     if not pending then
-      return nil, false
+      return nil
     end
     piece = pending .. piece
   elseif pending then
-    lost = is_ours(host, connection, sub(pending, 5), direction)
+    lost = way_of(host, connection, sub(pending, 5), direction)
   end
   local size, channel = u16(piece, 1), u16(piece, 3)
   if channel and channel ~= ATT_CHANNEL then
@@ -170,7 +171,7 @@ local function put_together(host, connection, piece, continues, direction, cut)
   elseif channel and #piece >= size + 4 then
     return sub(piece, 5, size + 4), lost
   elseif cut then
-    return nil, lost or is_ours(host, connection, sub(piece, 5), direction)
+    return nil, lost, way_of(host, connection, sub(piece, 5), direction)
   end
   connection.pending[direction] = piece
   return nil, lost
@@ -185,8 +186,9 @@ end
 --- One HCI packet, in the order of the capture, once. `length`: as it was before the snap length; `adapter`: a number;
 -- `unseen`: packets before this one were not read, so that it may be the reply to any request.
 -- Returns, where it has to do with us, its connection and
---   the value of an attribute of ours, and its position in `raw`, or nil where it came in several packets; or nil, nil;
---   whether bytes before it are lost, and the way that they and it go: M.SENT, M.RECEIVED.
+--   the value of an attribute of ours, its way (M.SENT, M.RECEIVED), and its position in `raw`, or nil where it came in
+--   several packets; or three times nil;
+--   the ways of bytes that are lost, nil where none are: of a packet before this one, and of this one.
 function M.read(host, raw, length, adapter, direction, unseen)
   local kind, at = M.shape(raw, length)
   if kind == "event" then
@@ -202,20 +204,17 @@ function M.read(host, raw, length, adapter, direction, unseen)
   local key = key_of(adapter, field % 4096)
   local connection = host.connections[key] or connect(host, key)
   local continues = (field - field % 4096) / 4096 % 4 == 1
-  local pdu, lost = put_together(host, connection, sub(raw, at + 4), continues, direction, #raw < length)
-  local ours, way
-  if pdu then
-    ours, way = attribute(host, connection, pdu, direction, unseen)
-  end
-  if ours and not connection.begun then
+  local pdu, lost, cut = put_together(host, connection, sub(raw, at + 4), continues, direction, #raw < length)
+  local way = pdu and attribute(host, connection, pdu, direction, unseen)
+  if way and not connection.begun then
     connection.begun = begins(host, pdu)
   end
   if not connection.begun then
     return nil
-  elseif ours then
-    return connection, sub(pdu, 4), not continues and at + 11 or nil, lost, way
-  elseif lost then
-    return connection, nil, nil, true, direction == RECEIVED and RECEIVED or SENT
+  elseif way then
+    return connection, sub(pdu, 4), way, not continues and at + 11 or nil, lost, nil
+  elseif lost or cut then
+    return connection, nil, nil, nil, lost, cut
   end
   return nil
 end

@@ -233,6 +233,47 @@ def test_a_lost_piece_divides(dissect: Dissect) -> None:
     assert kinds(run(dissect, made)) == ["", "", "", "short", "", "junk"]
 
 
+@pytest.mark.parametrize("passes", PASSES)
+@pytest.mark.parametrize("link_type", [H4, H4_DIRECTION])
+def test_a_lost_piece_divides_its_own_side_alone(dissect: Dissect, link_type: int, passes: str) -> None:
+    """Also where the capture tells no directions (H4): the operation does."""
+    made = radio(link_type=link_type)
+    made.write(WRITES, REQUEST)  # 4
+    made.notify(SPEAKS, REPLY[:10])  # 5
+    made.att(SENT, bytes((0x52, WRITES, 0)) + bytes.fromhex(REQUEST), pieces=(10,))  # 6 and a lost one
+    del made.packets[-1]
+    made.notify(SPEAKS, REPLY[10:])  # 7
+    made.write(WRITES, REQUEST[:12])  # 8
+    made.notify(SPEAKS, REPLY, pieces=(10,))  # 9 and a lost one
+    del made.packets[-1]
+    made.write(WRITES, REQUEST[12:])  # 10
+    rows = run(dissect, made, **PASSES[passes])
+    held = "short" if passes == "one" else ""  # for now
+    assert kinds(rows) == ["", "", "", "frame", held, "", "frame", held, "", "frame"]
+    assert number(rows[6], "pack.voltage") == 53.3
+
+
+@pytest.mark.parametrize("passes", PASSES)
+@pytest.mark.parametrize("link_type", [H4, H4_DIRECTION])
+@pytest.mark.parametrize("from_board", [True, False])
+def test_a_lost_piece_divides_its_own_side(dissect: Dissect, from_board: bool, link_type: int, passes: str) -> None:
+    made = radio(link_type=link_type)
+    made.write(WRITES, REQUEST)  # 4
+    handle, opcode, side, text = (SPEAKS, 0x1B, RECEIVED, REPLY) if from_board else (WRITES, 0x52, SENT, REQUEST)
+    for part, pieces in (text[:12], ()), ("00" * 6, (10,)):  # 5; 6 and a lost one
+        made.att(side, bytes((opcode,)) + handle.to_bytes(2, "little") + bytes.fromhex(part), pieces=pieces)
+    del made.packets[-1]
+    if from_board:  # 7: the other side ends the wait in H4
+        made.write(WRITES, REQUEST)
+    else:
+        made.notify(SPEAKS, REPLY)
+    made.att(side, bytes((opcode,)) + handle.to_bytes(2, "little") + bytes.fromhex(text[12:]))  # 8
+    seen = kinds(run(dissect, made, **PASSES[passes]))
+    assert seen[:5] == ["", "", "", "frame", "short"]
+    assert seen[5:7] == ["", "frame"]
+    assert seen[7] != "frame"
+
+
 def test_both_directions_are_sides(dissect: Dissect) -> None:
     """The same bytes from the board are its echo, whenever; from the host again a retry. D2's write of one likewise."""
     write = with_crc(bytes.fromhex("d206000700ab")).hex()
