@@ -4,11 +4,12 @@
 --
 -- No dissector of Wireshark's hands us what we need - events, discovery, the operation that a value comes with - where
 -- there is no tree. So we look at whole packets ourselves, after Wireshark's dissectors (a postdissector). That costs
--- something for each packet of any capture; so it begins when the first value of any attribute of Bluetooth comes by.
+-- something for each packet of any capture; so it begins with the first packet of H4, or when the first value of any
+-- attribute of Bluetooth comes by.
 --
 --   packet --daly_hci--> value of an attribute of ours --daly_streams--> records --> daly_view
 --
--- What was there before that first value (discovery by Find Information alone) is read at a second look.
+-- What was there before that first value is read at a second look.
 
 local hci = require("daly_hci")
 local second_look = require("daly_second_look")
@@ -26,6 +27,7 @@ local read_to -- number of the newest packet that was read
 local began -- number of the first packet that was read, and whether discovery of an attribute of ours was known by then
 local learned
 local blind -- for a second look (daly_second_look): packets may have been read without a tree, or not at all
+local untold -- whether some were read without a tree, so that their adapters are not known
 local chosen = {} -- handles that are Daly's: by preference or by the user's choice
 
 local hook -- protocol of the postdissector
@@ -81,7 +83,7 @@ end
 --- Begin a capture. `with`: see daly_streams.capture; `handles`: the preference.
 function M.init(with, handles)
   options, chosen = with, handles_of(handles)
-  first, read_to, began = new_state(), 0, nil
+  first, read_to, began, untold = new_state(), 0, nil, false
   blind = second_look.new(new_state())
   blind.early = 0 -- number of the newest of those that were not read at first
 end
@@ -152,8 +154,10 @@ local function look_again(number, pinfo, raw, length)
     return nil, true
   end
   local complete = number ~= began or number == blind.early + 1
+  -- Where all adapters were known at first, they are no reason to read again.
+  local line = untold and adapter or 0
   local state, anew =
-    second_look.look(blind, first, number, adapter, false, read, adapter, number, pinfo, raw, length, not complete)
+    second_look.look(blind, first, number, line, false, read, adapter, number, pinfo, raw, length, not complete)
   if number == began and complete and not blind.several and blind.state.host.learned ~= learned then
     blind.several = true -- what came before tells otherwise
     return blind.state, true
@@ -169,8 +173,9 @@ local function look(buffer, pinfo, parent)
   local state, again = first, number <= read_to or pinfo.visited
   if not again then
     read_to = number
-    local adapter = has_tree() and adapter_of() or 0
-    read(first, adapter, number, pinfo, raw, length, not began and number > 1)
+    local told = has_tree()
+    untold = untold or not told
+    read(first, told and adapter_of() or 0, number, pinfo, raw, length, not began and number > 1)
     if not began then
       began, learned = number, first.host.learned
     end
@@ -195,26 +200,28 @@ local function look(buffer, pinfo, parent)
   at_hand = nil
 end
 
+-- Doors -------------------------------------------------------------------------------------------
+
+-- Discovery before the first value that comes by would be missed: where Wireshark's dissectors need nothing from
+-- outside a packet (H4, but not the monitor's and H1's), we begin with the first one, which we hand on; then the door
+-- is Wireshark's own again.
+local encapsulations = DissectorTable.get("wtap_encap")
+local wiresharks = {} -- by number of the encapsulation
+
 -- From now on look at each packet.
 local function watch()
   if not watching then
     watching = true
     register_postdissector(hook)
+    for encapsulation, door in pairs(wiresharks) do
+      encapsulations:add(encapsulation, door)
+    end
   end
 end
 
--- Doors -------------------------------------------------------------------------------------------
-
--- Captures of H4 do not tell directions, without which Wireshark knows of no attribute in discovery's replies. There we
--- begin with the first packet, which we hand on; the door is Wireshark's own again after it.
-local encapsulations = DissectorTable.get("wtap_encap")
-local H4 = wtap.BLUETOOTH_H4
-local wiresharks
-
 local function hand_on(buffer, pinfo, parent)
-  encapsulations:add(H4, wiresharks)
   watch()
-  return wiresharks:call(buffer, pinfo, parent)
+  return wiresharks[pinfo.match_uint]:call(buffer, pinfo, parent)
 end
 
 --- Once: where we come in. `daly`: the protocol.
@@ -233,9 +240,11 @@ function M.setup(daly)
     return 0
   end
   come_in()
-  wiresharks = encapsulations:get_dissector(H4)
-  if wiresharks then
-    encapsulations:add(H4, hook)
+  for _, encapsulation in ipairs({ wtap.BLUETOOTH_H4, wtap.BLUETOOTH_H4_WITH_PHDR }) do
+    wiresharks[encapsulation] = encapsulations:get_dissector(encapsulation)
+    if wiresharks[encapsulation] then
+      encapsulations:add(encapsulation, hook)
+    end
   end
   attributes:add_for_decode_as(daly)
 end

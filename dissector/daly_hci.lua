@@ -51,19 +51,19 @@ local function short_uuid(raw, first, last)
 end
 
 --- Connections of a capture. `chosen`: set of handles that are Daly's on all connections. In it, `learned` tells
--- whether some discovery named an attribute of Daly's.
+-- how often discovery named an attribute of Daly's, and `unseen` whether packets were not read before the first one.
 function M.new(chosen)
-  return { chosen = chosen, connections = {}, count = 0, learned = false }
+  return { chosen = chosen, connections = {}, count = 0, learned = 0, unseen = false }
 end
 
--- A connection begins; what was known of an earlier one is forgotten.
-local function connect(host, key)
+-- A connection begins; what was known of an earlier one is forgotten. `asked`: see below.
+local function connect(host, key, asked)
   host.count = host.count + 1
   local connection = {
     number = host.count, -- of all, in order
     attributes = {}, -- by handle: whether its characteristic is one that Daly has, as discovered
     begun = false, -- whether a value was Daly's: until then what discovery alone tells is nobody's
-    asked = nil, -- the UUID that the last Read By Type request asks for
+    asked = asked, -- the UUID that the last Read By Type request asks for
     pending = {}, -- by direction: the beginning of an L2CAP packet
   }
   host.connections[key] = connection
@@ -110,7 +110,7 @@ local function learn(host, connection, pdu, at, size, handle_at, uuid_at)
     local uuid = short_uuid(pdu, at + uuid_at, at + size - 1)
     local ours = OURS[uuid] or false
     connection.attributes[u16(pdu, at + handle_at)] = ours
-    host.learned = host.learned or ours
+    host.learned = host.learned + (ours and 1 or 0)
     at = at + size
   end
 end
@@ -132,12 +132,12 @@ local function way_of(host, connection, pdu, direction)
 end
 
 -- An ATT packet: learn from it; the way that it goes, where it carries a value of ours, else nil.
-local function attribute(host, connection, pdu, direction, unseen)
+local function attribute(host, connection, pdu, direction)
   local opcode, format = byte(pdu, 1, 2)
   if opcode == READ_TYPE and goes(direction, SENT) then
     connection.asked = #pdu >= 7 and short_uuid(pdu, 6, #pdu) or 0
   elseif opcode == READ_TYPE_REPLY and goes(direction, RECEIVED) then
-    if format and (connection.asked == CHARACTERISTIC or unseen) then
+    if format and connection.asked == CHARACTERISTIC then
       learn(host, connection, pdu, 3, format, 3, 5) -- declaration's handle, properties, value's handle, UUID
     end
     connection.asked = nil
@@ -184,7 +184,7 @@ local function begins(host, pdu)
 end
 
 --- One HCI packet, in the order of the capture, once. `length`: as it was before the snap length; `adapter`: a number;
--- `unseen`: packets before this one were not read, so that it may be the reply to any request.
+-- `unseen`: packets before this one were not read, so that on any connection the first reply may be to any request.
 -- Returns, where it has to do with us, its connection and
 --   the value of an attribute of ours, its way (M.SENT, M.RECEIVED), and its position in `raw`, or nil where it came in
 --   several packets; or three times nil;
@@ -202,10 +202,11 @@ function M.read(host, raw, length, adapter, direction, unseen)
   end
   local field = u16(raw, at)
   local key = key_of(adapter, field % 4096)
-  local connection = host.connections[key] or connect(host, key)
+  host.unseen = host.unseen or unseen
+  local connection = host.connections[key] or connect(host, key, host.unseen and CHARACTERISTIC or nil)
   local continues = (field - field % 4096) / 4096 % 4 == 1
   local pdu, lost, cut = put_together(host, connection, sub(raw, at + 4), continues, direction, #raw < length)
-  local way = pdu and attribute(host, connection, pdu, direction, unseen)
+  local way = pdu and attribute(host, connection, pdu, direction)
   if way and not connection.begun then
     connection.begun = begins(host, pdu)
   end

@@ -100,11 +100,12 @@ def test_an_android_log(tshark: Tshark, open_folder: Path) -> None:
 
 @pytest.mark.parametrize("passes", PASSES)
 @pytest.mark.parametrize("way", ["type", "information"])
-def test_attributes_by_discovery(dissect: Dissect, way: str, passes: str) -> None:
+@pytest.mark.parametrize("link_type", [H4, H4_DIRECTION, MONITOR])
+def test_attributes_by_discovery(dissect: Dissect, link_type: int, way: str, passes: str) -> None:
     short = ((0x21, 0xFFF1), (0x23, 0xFFF2), (0x29, 0xFFF3))
     long = ((0x25, 0xFF01), (0x27, 0xFF02), (0x2B, 0x2A19))  # of 16 bytes
     found = (*short[:2], *long[:2], short[2], long[2])
-    made = Radio()
+    made = Radio(link_type=link_type)
     made.complete()
     if way == "type":
         made.discover(*short)
@@ -118,8 +119,8 @@ def test_attributes_by_discovery(dissect: Dissect, way: str, passes: str) -> Non
         made.write(handle, REQUEST, opcode=WRITE_REQUEST)
     seen = kinds(run(dissect, made, **PASSES[passes]))
     assert seen[:quiet] == [""] * quiet
-    # What was found before the first value of any attribute came by is known in a second pass.
-    missed = way == "information" and passes == "one"
+    # What the monitor found before the first value of any attribute came by is known in a second pass.
+    missed = way == "information" and passes == "one" and link_type == MONITOR
     assert seen[quiet:] == ([""] * 12 if missed else ["frame"] * 8 + [""] * 4)
 
 
@@ -418,6 +419,52 @@ def test_two_interfaces_have_handles_of_their_own(dissect: Dissect, passes: str)
     assert kinds(rows) == ["", "", "", "", "frame"]
 
 
+@pytest.mark.parametrize("passes", PASSES)
+@pytest.mark.parametrize(
+    ("link_type", "adapters"), [(H4, False), (H4_DIRECTION, False), (MONITOR, False), (MONITOR, True)]
+)
+def test_two_lines_at_once(dissect: Dissect, link_type: int, adapters: bool, passes: str) -> None:
+    """Step by step on both: with a tree in the first pass, the second tells all (replies, ends of what is held)."""
+    both = [radio(link_type=link_type, **{"adapter" if adapters else "interface": line}) for line in (0, 1)]
+    for one in both:  # 4 to 6 of each
+        one.write(WRITES, REQUEST)
+        one.notify(SPEAKS, REPLY[:12])
+        one.notify(SPEAKS, REPLY[12:])
+    packets = [
+        P(packet.hex, 2 * packet.at + one.step * line, packet.interface)
+        for step in zip(*(one.packets for one in both), strict=True)
+        for line, (one, packet) in enumerate(zip(both, step, strict=True))
+    ]
+    rows = dissect(packets, link_type=link_type, descriptions=["a", "b"], **PASSES[passes])
+    final = passes == "two with a tree"
+    held = "" if final else "short"
+    assert kinds(rows) == [""] * 6 + ["frame"] * 2 + [held] * 2 + ["frame"] * 2
+    assert [number(row, "request_in") for row in rows[10:]] == [7, 8]
+    assert [number(row, "pack.voltage") for row in rows[10:]] == [53.3, 53.3]
+    if final:
+        assert [number(row, "reply_in") for row in rows[6:8]] == [11, 12]
+        assert [number(row, "continued_in") for row in rows[8:10]] == [11, 12]
+
+
+@pytest.mark.parametrize("passes", PASSES)
+@pytest.mark.parametrize("link_type", [H4, H4_DIRECTION, MONITOR])
+def test_discovery_in_several_acl_packets(dissect: Dissect, link_type: int, passes: str) -> None:
+    made = Radio(link_type=link_type)
+    made.complete()
+    made.att(SENT, bytes.fromhex("080100ffff0328"))
+    made.att(RECEIVED, bytes.fromhex("0907 0e00 10 0f00 f2ff 1000 10 1100 f1ff"), pieces=(9,))  # 3, 4
+    made.write(WRITES, REQUEST)  # 5
+    made.notify(SPEAKS, REPLY)
+    rows = run(dissect, made, **PASSES[passes])
+    if link_type == MONITOR and passes == "one":  # there the first packet that we are shown is the end of the reply
+        assert kinds(rows) == [""] * 6
+        return
+    assert kinds(rows) == ["", "", "", "", "frame", "frame"]
+    assert number(rows[5], "request_in") == 5
+    if passes == "two with a tree" and link_type != MONITOR:
+        assert number(rows[4], "reply_in") == 6
+
+
 def test_discovery_is_of_characteristics_and_by_the_host(dissect: Dissect) -> None:
     made = Radio()
     made.complete()
@@ -469,6 +516,27 @@ def test_beside_a_serial_line(tshark: Tshark, open_folder: Path) -> None:
     for passes in (), ("-2",):
         rows = ask(tshark, path, *passes, names=["daly.transport", "daly.request_in"])
         assert rows == [["", ""]] * 3 + [["ble", ""], ["uart", ""], ["uart", "5"]]
+
+
+@pytest.mark.parametrize("passes", [(), ("-2",), ("-2", "-Y", "frame")])
+def test_link_types_in_one_file(tshark: Tshark, open_folder: Path, passes: tuple[str, ...]) -> None:
+    """Whichever we came in by, each packet is Wireshark's first of all, and the door is shut behind us."""
+    path = open_folder / "both.pcapng"
+    kinds_of = (MONITOR, H4_DIRECTION, H4)
+    with open_writer(path) as writer:
+        for link_type in kinds_of:
+            writer.add_interface(Interface(f"radio{link_type}", "bluetooth", link_type))
+        at = 0
+        for which, link_type in enumerate(kinds_of):
+            made = radio(link_type=link_type)
+            made.write(WRITES, REQUEST)
+            for packet in made.packets:
+                at += 10_000_000
+                writer.write_packet(1_700_000_000_000_000_000 + at, bytes.fromhex(packet.hex), interface=which)
+    names = ["_ws.col.Protocol", "daly.kind"]
+    rows = ask(tshark, path, *passes, names=names)
+    assert [row[0] for row in rows] == ["HCI_EVT", "ATT", "ATT", "Daly"] * 3
+    assert [row[1] for row in rows] == ["", "", "", "frame"] * 3
 
 
 def ble_records() -> dict[str, dict[str, Any]]:

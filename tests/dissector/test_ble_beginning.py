@@ -246,8 +246,8 @@ def test_what_is_lost_before_the_beginning_divides_nothing(dissect: Dissect, pas
 
 @pytest.mark.parametrize("passes", PASSES)
 def test_found_by_information_before_the_first_value(dissect: Dissect, passes: str) -> None:
-    """Then a first pass knows of no attribute, and a second reads anew: the beginning is where it was."""
-    made = Radio()
+    """The monitor's first pass knows of no attribute, and a second reads anew: the beginning is where it was."""
+    made = Radio(link_type=MONITOR)
     made.complete()
     made.find_information(*DISCOVERED)
     talk(made, ELM327)  # 4 to 11
