@@ -228,7 +228,8 @@ end
 function M.setup(daly)
   -- With each handle Wireshark looks for the protocol in a list sorted by name, behind all of Bluetooth's own, which
   -- begin with bt: there it would start up half again as slowly.
-  hook = Proto("ble_daly", "Daly BMS over Bluetooth")
+  -- It stands in frame.protocols of a first packet, whose traffic ours may not be: so it is not named for Daly.
+  hook = Proto("ble_bms", "BMS over Bluetooth")
   function hook.dissector(buffer, pinfo, parent)
     if buffer:offset() > 0 then -- the value of an attribute
       watch()
