@@ -533,10 +533,10 @@ def test_link_types_in_one_file(tshark: Tshark, open_folder: Path, passes: tuple
             for packet in made.packets:
                 at += 10_000_000
                 writer.write_packet(1_700_000_000_000_000_000 + at, bytes.fromhex(packet.hex), interface=which)
-    names = ["_ws.col.Protocol", "daly.kind"]
-    rows = ask(tshark, path, *passes, names=names)
-    assert [row[0] for row in rows] == ["HCI_EVT", "ATT", "ATT", "Daly"] * 3
-    assert [row[1] for row in rows] == ["", "", "", "frame"] * 3
+    rows = ask(tshark, path, *passes, names=["bthci_evt.code", "btatt.opcode", "daly.kind"])
+    assert [bool(row[0]) for row in rows] == [True, False, False, False] * 3
+    assert [bool(row[1]) for row in rows] == [False, True, True, True] * 3
+    assert [row[2] for row in rows] == ["", "", "", "frame"] * 3
 
 
 def ble_records() -> dict[str, dict[str, Any]]:
